@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/limits.hpp"
 #include "server/api/resources.hpp"
 #include "server/base/log.hpp"
 #include "server/http/problem.hpp"
@@ -175,6 +176,10 @@ const char* Router::route(const http::Request& request, const http::Reply& reply
 StreamedBody Router::stream_body(const http::Request& request, std::uint64_t bytes) const {
   const auto resource = find(request);
   const Route* const route = resource ? resource->find(request.method) : nullptr;
+  if (resource && route == nullptr && request.method != "OPTIONS" &&
+      bytes > protocol::limits::http_body_bytes_max) {
+    return {nullptr, method_not_allowed(request.method, resource->allow())};
+  }
   if (route == nullptr || !route->open_sink) return {};
   if (draining_) {
     return {nullptr,

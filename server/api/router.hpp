@@ -31,7 +31,7 @@ class Router {
   // Returns the route name (routes.hpp).
   const char* route(const http::Request& request, const http::Reply& reply) const;
   // Where the body of the request goes, of which only the header has been received; neither sink
-  // nor refusal: it is read as a whole.
+  // nor refusal: it is read as a whole. A long body is refused here if the method is not allowed.
   [[nodiscard]] StreamedBody stream_body(const http::Request& request, std::uint64_t bytes) const;
   // All values of route(), without repetition: a bounded set.
   [[nodiscard]] std::vector<const char*> route_names() const;

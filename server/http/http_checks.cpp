@@ -28,7 +28,7 @@ std::size_t count(const Request& request, std::string_view name) {
                     [&](const auto& field) { return equal_without_case(field.first, name); }));
 }
 
-std::optional<Response> check_length(const Request& request, std::uint64_t bytes_max) {
+std::optional<Response> check_length(const Request& request) {
   if (count(request, "Content-Length") > 1) return bad_request("duplicate Content-Length");
   const std::string text = request.header("Content-Length");
   if (text.empty()) {
@@ -42,9 +42,7 @@ std::optional<Response> check_length(const Request& request, std::uint64_t bytes
   if (stop != text.data() + text.size() || fault == std::errc::invalid_argument) {
     return bad_request("Content-Length is not a number");
   }
-  if (fault != std::errc() || length > bytes_max) {
-    return body_too_large();
-  }
+  if (fault != std::errc()) return body_too_large();
   return std::nullopt;
 }
 
@@ -123,8 +121,7 @@ std::optional<Response> check_header_bytes(std::string_view header) {
   return std::nullopt;
 }
 
-std::optional<Response> check_request(const Request& request, unsigned version,
-                                      std::uint64_t body_bytes_max) {
+std::optional<Response> check_request(const Request& request, unsigned version) {
   if (version != 11 && version != 10) {
     return problem_response(505, "HTTP Version Not Supported",
                             "this server speaks HTTP/1.1 and HTTP/1.0");
@@ -149,7 +146,7 @@ std::optional<Response> check_request(const Request& request, unsigned version,
                             "the only supported expectation is 100-continue");
   }
   if (auto fault = check_coding(request)) return fault;
-  return check_length(request, body_bytes_max);
+  return check_length(request);
 }
 
 bool asks_for_websocket(const Request& request, unsigned version) {

@@ -1,11 +1,9 @@
 // Rejects requests that HTTP allows and this server does not support, before a body is read.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string_view>
 
-#include "protocol/limits.hpp"
 #include "server/http/exchange.hpp"
 
 namespace windsplat::http {
@@ -15,10 +13,8 @@ namespace windsplat::http {
 std::optional<Response> check_header_bytes(std::string_view header);
 
 // Method, Host, Transfer-Encoding, Content-Length and Expect of a parsed header. `version` is 11
-// for HTTP/1.1.
-std::optional<Response> check_request(
-    const Request& request, unsigned version,
-    std::uint64_t body_bytes_max = protocol::limits::http_body_bytes_max);
+// for HTTP/1.1. How long a body may be is judged by what takes it.
+std::optional<Response> check_request(const Request& request, unsigned version);
 
 // Whether a client requests a WebSocket (RFC 6455, 4.2.1); list headers may span several lines.
 bool asks_for_websocket(const Request& request, unsigned version);

@@ -5,6 +5,7 @@ Usage: uploads.py --program=PATH [unittest arguments]
 """
 import base64
 import hashlib
+import http.client
 import io
 import json
 import os
@@ -161,13 +162,19 @@ class Uploads(WithUploads):
         self.wait_until(lambda: self.put("b.raw", bytes(half)).status == 201)
 
     def test_a_length_above_all_limits_is_refused_before_the_body(self):
-        for method, target, length in (("PUT", "/v1/uploads/a.nc", 10**15),
-                                       ("POST", "/v1/frames", LIMIT // 2)):
+        for method, target, length, status, text in (
+                ("PUT", "/v1/uploads/a.nc", 10**15, 507, f"{10**15} bytes"),
+                ("PUT", "/v1/uploads/a.nc", 2**64 - 1, 507, f"--upload-limit {LIMIT}"),
+                ("POST", "/v1/uploads/a.nc", 10**6, 405, ""),
+                ("POST", "/v1/frames", LIMIT // 2, 413, "at most 65536 bytes")):
             with socket.create_connection(self.daemon.host.split(":")) as client:
                 client.sendall(f"{method} {target} HTTP/1.1\r\nHost: {self.daemon.host}\r\n"
                                "Content-Type: application/json\r\n"
                                f"Content-Length: {length}\r\n\r\n".encode())
-                self.assertIn(b" 413 ", client.recv(200))
+                answer = http.client.HTTPResponse(client)
+                answer.begin()
+                self.assertEqual(answer.status, status, (method, target, length))
+                self.assertIn(text.encode(), answer.read())
 
     def begun(self, name, length, sent=1000):
         """A connection whose upload is not complete."""
@@ -295,7 +302,8 @@ class Uploads(WithUploads):
     def test_uploads_are_off_unless_asked_for(self):
         self.daemon.end()
         self.daemon = Daemon(PROGRAM, "tornado", "--state-dir", self.state)
-        for answer in (self.put("a.nc", b"x"), self.daemon.get("/v1/uploads/a.nc"),
+        for answer in (self.put("a.nc", b"x"), self.put("a.nc", bytes(100_000)),
+                       self.daemon.get("/v1/uploads/a.nc"),
                        self.daemon.ask("DELETE", "/v1/uploads/a.nc"),
                        self.daemon.post("/v1/datasets", {"upload": "a.nc"})):
             self.assert_refused(answer, 403, "--upload-limit")

@@ -1,12 +1,9 @@
 #include "server/transport/http/http_gate.hpp"
 
-#include <algorithm>
-#include <cstdint>
 #include <ctime>
 #include <string>
 #include <utility>
 
-#include "protocol/limits.hpp"
 #include "server/access/auth.hpp"
 #include "server/access/login.hpp"
 #include "server/http/http_checks.hpp"
@@ -27,9 +24,7 @@ bool is_known_host(const api::ServerOptions& options, const std::string& host) {
 
 std::optional<http::Response> check_form(const api::ServerOptions& options, http::Request& request,
                                          boost::beast::string_view target, unsigned version) {
-  const std::uint64_t bytes_max = std::max<std::uint64_t>(
-      protocol::limits::http_body_bytes_max, options.uploads ? options.uploads->bytes_max() : 0);
-  if (auto fault = http::check_request(request, version, bytes_max)) return fault;
+  if (auto fault = http::check_request(request, version)) return fault;
   const std::string host = request.header("Host");
   if (!is_known_host(options, host)) {
     return http::problem_response(
