@@ -410,9 +410,50 @@ bool is_velocity_component(const FileVariable& variable) {
          (is_velocity(variable.units) && is_one_of(lower(variable.name), of_schism));
 }
 
+namespace {
+
+// Whether a variable may be a component of a velocity whose name tells nothing: its units are those
+// of a speed, and no name says that it is another quantity.
+bool may_be_component(const FileVariable& variable) {
+  constexpr auto others =
+      std::to_array<std::string_view>({"speed", "gust", "rate", "precipitation"});
+  const std::string names = lower(variable.name + ' ' + variable.long_name);
+  const std::string& standard = variable.standard_name;
+  const bool of_flow =
+      standard.empty() || contains(standard, "wind") || contains(standard, "velocity");
+  return is_speed(variable.units) && of_flow &&
+         std::none_of(others.begin(), others.end(), [&](std::string_view other) {
+           return contains(names, other) || contains(standard, other);
+         });
+}
+
+// Of data without a vector: a note on the fields that may be its components, at least two.
+void tell_unnamed_components(const FileContents& contents, const std::vector<FieldPlan>& plans,
+                             std::vector<std::string>& notes) {
+  constexpr std::size_t names_told_max = 6;
+  std::string names;
+  std::size_t count = 0;
+  for (const FieldPlan& plan : plans) {
+    if (plan.info.kind == FieldKind::vector) return;
+    const FileVariable& variable =
+        contents.variables.at(static_cast<std::size_t>(plan.variables.front()));
+    if (!may_be_component(variable) || ++count > names_told_max) continue;
+    names += (names.empty() ? "" : ", ") + in_quotes(variable.name);
+  }
+  if (count < 2) return;
+  if (count > names_told_max) names += " and " + std::to_string(count - names_told_max) + " more";
+  notes.push_back("no vector field was found: if " + names +
+                  " are components of a velocity, give them a standard_name such as x_wind and "
+                  "y_wind (docs/user/faq.md)");
+}
+
+}  // namespace
+
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
                                    AxisKind vertical, std::vector<std::string>& notes) {
-  return FieldFinder(contents, variables, vertical, notes).find();
+  std::vector<FieldPlan> plans = FieldFinder(contents, variables, vertical, notes).find();
+  tell_unnamed_components(contents, plans, notes);
+  return plans;
 }
 
 }  // namespace windsplat::data::cf

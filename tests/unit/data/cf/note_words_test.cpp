@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ namespace windsplat::data::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 TEST(NoteWords, HeightsOfSamplesAreNamedAsInTheFile) {
   const Folder folder;
@@ -94,6 +96,39 @@ TEST(NoteWords, AFieldWithACodeIsNoMapProjection) {
   }
   const auto source = opened(folder / "code.nc");
   EXPECT_TRUE(has_note(source->info(), "the map projection of 'ua' "));
+}
+
+// Two fields of these names and units, and standard names unless empty.
+std::string notes_of_two(const Folder& folder, const std::array<std::string, 2>& names,
+                         const std::string& units, const std::array<std::string, 2>& standard) {
+  {
+    NetcdfMaker file(folder / "two.nc");
+    const int y = file.axis("y", {0, 1}, "m");
+    const int x = file.axis("x", {0, 1, 2}, "m");
+    for (std::size_t n = 0; n < names.size(); ++n) {
+      const int field = file.variable(names.at(n), NC_FLOAT, {y, x}, counting(6));
+      file.text(field, "units", units);
+      if (!standard.at(n).empty()) file.text(field, "standard_name", standard.at(n));
+    }
+  }
+  std::string all;
+  const auto source = opened(folder / "two.nc");
+  for (const std::string& note : source->info().notes) all += note + '\n';
+  return all;
+}
+
+TEST(NoteWords, VelocitiesOfUnknownNamesAreToldOnlyIfNoVectorWasFound) {
+  const Folder folder;
+  for (const char* const units : {"m/s", "cm s-1", "mm/s"}) {
+    EXPECT_THAT(notes_of_two(folder, {"alpha", "beta"}, units, {}),
+                HasSubstr("no vector field was found: if 'alpha', 'beta' are components"))
+        << units;
+  }
+  const auto silent = Not(HasSubstr("no vector field"));
+  EXPECT_THAT(notes_of_two(folder, {"alpha", "beta"}, "m/s", {"x_wind", "y_wind"}), silent);
+  EXPECT_THAT(notes_of_two(folder, {"alpha", "beta"}, "K", {}), silent);
+  EXPECT_THAT(notes_of_two(folder, {"speed_10m", "gust"}, "m/s", {}), silent);
+  EXPECT_THAT(notes_of_two(folder, {"a", "b"}, "m/s", {"rainfall_rate", "snowfall_flux"}), silent);
 }
 
 }  // namespace
