@@ -3,6 +3,7 @@
 #include <array>
 #include <string_view>
 
+#include "server/base/nearest_word.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/lines/mark.hpp"
 
@@ -20,6 +21,20 @@ void look_by_default(protocol::View& completed, const Lattice& lattice) {
   camera.height.reset();
   camera.up = protocol::CameraView{}.up;
   complete_camera(completed, lattice);
+}
+
+}  // namespace
+
+namespace {
+
+// The preset that may be meant, or all.
+std::string known_presets(const std::string& name) {
+  if (std::string meant = did_you_mean(name, preset_names()); !meant.empty()) return meant;
+  std::string list;
+  for (const std::string_view each : names) {
+    list.append(list.empty() ? "; presets: " : ", ").append(each);
+  }
+  return list;
 }
 
 }  // namespace
@@ -46,7 +61,7 @@ Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
     orbit(completed, lattice, 0, 0, 1);
   } else {
     return make_error_at(ErrorKind::invalid, "/preset",
-                         "unknown preset \"" + printable(preset) + "\"");
+                         "unknown preset \"" + printable(preset) + "\"" + known_presets(preset));
   }
   return {};
 }

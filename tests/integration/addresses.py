@@ -223,7 +223,8 @@ class Addresses(unittest.TestCase):
             "vector": {"field": None}, "scalars": [medium], "surfaces": surfaces[:1]}).body)
 
     def test_fields_that_do_not_exist_are_refused_with_those_that_do(self):
-        self.assert_refused(self.frame("field=winds"), "'winds'", "wind", "cloud", "t")
+        self.assert_refused(self.frame("field=zzzz"), "'zzzz'; fields: ", "wind", "cloud", "t")
+        self.assert_refused(self.frame("field=winds"), "did you mean 'wind'?")
         self.assert_refused(self.frame("field="), "''")
         self.assert_refused(self.frame("field=t,t"), "named twice")
         self.assert_refused(self.frame("field=wind,current"), "more than one vector")
@@ -321,9 +322,33 @@ class Probes(unittest.TestCase):
                             ("index=0,0,0&lat=0", "mutually exclusive"),
                             ("lon=0&lat=91&level=700", "'lat' must be -90 to 90"),
                             ("lon=0&lat=0&level=700&heightField=t", "'level'"),
-                            ("lon=0&level=700", "y is required")):
+                            ("lon=0&level=700", "'lat' is required beside 'lon'"),
+                            ("lat=0&level=700", "'lon' is required beside 'lat'"),
+                            ("x=0&z=700", "y is required")):
             status, detail = self.probe("globe", query).detail()
             self.assertEqual(status, 422, query)
+            self.assertIn(text, detail)
+
+    def test_misspelt_names_are_answered_with_the_nearest_or_all(self):
+        view = {"dataset": "globe", "image": {"width": 64, "height": 48}}
+        for path, texts in (
+                ("datasets/glob/frame.png", ["no dataset 'glob'; did you mean 'globe'?"]),
+                ("datasets/globe/frame.png?preset=figur", ["did you mean 'figure'?"]),
+                ("datasets/globe/frame.png?preset=zzzz", ["presets: default, winds"]),
+                ("datasets/globe/fields/winds/values.npy", ["did you mean 'wind'?"]),
+                ("datasets/globe/fields/zzzz/values.npy", ["fields: ", "wind"]),
+                ("datasets/globe/frame.png?field=winds", ["did you mean 'wind'?"]),
+                ("datasets/globe/probe?lon=0&lat=0&level=700&fields=winds",
+                 ["did you mean 'wind'?"])):
+            status, detail = self.daemon.get(f"/v1/{path}").detail()
+            self.assertIn(status, (404, 422), path)
+            for text in texts:
+                self.assertIn(text, detail, path)
+        for part, text in (({"scalars": [{"field": "winds"}]}, "did you mean 'wind'?"),
+                           ({"vector": {"field": "zzzz"}}, "fields: "),
+                           ({"vector": {"strid": 2}}, "did you mean 'stride'?")):
+            status, detail = self.daemon.post("/v1/frames", {**view, **part}).detail()
+            self.assertEqual(status, 422)
             self.assertIn(text, detail)
 
 

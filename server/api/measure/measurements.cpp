@@ -161,7 +161,8 @@ Result<std::vector<std::string>> read_fields(http::QueryReader& query,
     at = end + 1;
     if (info.find(out.back()) != nullptr) continue;
     return make_error(ErrorKind::invalid, "query parameter 'fields': there is no field '" +
-                                              printable(out.back()) + "'");
+                                              printable(out.back()) + "'" +
+                                              data::absence_text(info, out.back()));
   }
   return out;
 }

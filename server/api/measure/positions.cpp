@@ -71,6 +71,12 @@ Result<std::array<std::optional<double>, 3>> place_along_axes(const PlaceQuery& 
         described(grid.axes[0]) + " and " + described(grid.axes[1]) +
         ", of which 'x' and 'y' are coordinates");
   }
+  for (std::size_t a = 0; a < 2; ++a) {
+    const bool is_needed = grid.columns || grid.axes.at(a).coordinates.size() > 1;
+    if (!place.geographic.at(1 - a) || out.at(a) || !is_needed) continue;
+    return refuse("query parameter '" + std::string(geographic_names.at(a)) +
+                  "' is required beside '" + std::string(geographic_names.at(1 - a)) + "'");
+  }
   if (place.geographic[2] && has_heights) {
     return refuse(
         "query parameter 'level' is a coordinate of the vertical axis; with "

@@ -16,8 +16,6 @@
 namespace windsplat::api {
 namespace {
 
-constexpr std::size_t names_shown_max = 40;  // of the fields in a message
-
 struct Part {
   std::string_view name;  // as the key of the view
   bool protocol::AnnotationsView::*shown;
@@ -71,15 +69,6 @@ Changes read_changes(http::QueryReader& query) {
   return out;
 }
 
-std::string fields_of(const data::DatasetInfo& info) {
-  std::string list;
-  for (std::size_t n = 0; n < std::min(info.fields.size(), names_shown_max); ++n) {
-    list += (n > 0 ? ", " : "") + printable(info.fields[n].name, 60);
-  }
-  const std::size_t more = info.fields.size() - std::min(info.fields.size(), names_shown_max);
-  return more > 0 ? list + " and " + std::to_string(more) + " more" : list;
-}
-
 Error refuse_field(const std::string& why) {
   return make_error(ErrorKind::invalid, "query parameter 'field': " + why);
 }
@@ -93,8 +82,7 @@ Result<std::vector<const data::FieldInfo*>> find_fields(const data::DatasetInfo&
     const data::FieldInfo* const field = info.find(std::string(name));
     if (field == nullptr) {
       return refuse_field("there is no field '" + printable(name, 60) + "'" +
-                          data::absence_text(info, std::string(name)) +
-                          "; fields: " + fields_of(info));
+                          data::absence_text(info, std::string(name)));
     }
     if (std::find(out.begin(), out.end(), field) != out.end()) {
       return refuse_field("'" + printable(name, 60) + "' is named twice");

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "server/base/error.hpp"
+#include "server/base/nearest_word.hpp"
 
 namespace windsplat::data {
 
@@ -31,10 +32,29 @@ const FieldInfo* DatasetInfo::first(FieldKind kind) const {
   return at == fields.end() ? nullptr : &*at;
 }
 
+namespace {
+
+// The field that may be meant, or those that there are.
+std::string known_fields(const DatasetInfo& info, const std::string& name) {
+  constexpr std::size_t names_shown_max = 40;
+  constexpr std::size_t name_shown_max = 60;  // bytes
+  std::vector<std::string> names;
+  for (const FieldInfo& field : info.fields) names.push_back(field.name);
+  if (std::string meant = did_you_mean(name, names); !meant.empty()) return meant;
+  std::string list;
+  for (std::size_t n = 0; n < std::min(names.size(), names_shown_max); ++n) {
+    list += (n > 0 ? ", " : "; fields: ") + printable(names[n], name_shown_max);
+  }
+  if (names.size() <= names_shown_max) return list;
+  return list + " and " + std::to_string(names.size() - names_shown_max) + " more";
+}
+
+}  // namespace
+
 std::string absence_text(const DatasetInfo& info, const std::string& name) {
   const auto left = std::find_if(info.left_out.begin(), info.left_out.end(),
                                  [&](const LeftOut& one) { return one.name == name; });
-  if (left == info.left_out.end()) return {};
+  if (left == info.left_out.end()) return known_fields(info, name);
   constexpr std::size_t shown_max = 200;
   if (!left->reason.starts_with("on another grid")) {
     return ": it is left out, " + printable(left->reason, shown_max);

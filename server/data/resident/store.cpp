@@ -77,20 +77,23 @@ struct Store::State {
 
   // All guarded by the mutex.
   [[nodiscard]] const Entry* find(const std::string& id) const {
-    const auto at = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) {
-      return entry.dataset->info().id == id;
-    });
+    const auto at = std::ranges::find_if(
+        entries, [&](const Entry& entry) { return entry.dataset->info().id == id; });
     return at == entries.end() ? nullptr : &*at;
   }
   [[nodiscard]] DatasetPtr known(const std::string& key) const {
-    const auto at = std::find_if(entries.begin(), entries.end(),
-                                 [&](const Entry& entry) { return entry.key == key; });
+    const auto at = std::ranges::find(entries, key, &Entry::key);
     return at == entries.end() ? nullptr : at->dataset;
   }
   [[nodiscard]] FailedEntry* find_failed(const std::string& id) {
-    const auto at = std::find_if(failed.begin(), failed.end(),
-                                 [&](const FailedEntry& one) { return one.listed.id == id; });
+    const auto at = std::ranges::find_if(failed, [&](auto& one) { return one.listed.id == id; });
     return at == failed.end() ? nullptr : &*at;
+  }
+  [[nodiscard]] Error no_dataset(const std::string& id) const {
+    std::vector<std::string> ids;
+    for (const Entry& entry : entries) ids.push_back(entry.dataset->info().id);
+    return make_error(ErrorKind::not_found,
+                      "there is no dataset " + in_quotes(id) + did_you_mean(id, ids));
   }
   // `key`: key of a failed dataset to be replaced, whose id becomes free; empty: none.
   [[nodiscard]] std::string unique_id(const std::string& wanted, const std::string& key) {
@@ -252,8 +255,7 @@ struct Store::State {
   // destroyed outside the lock.
   Entry put(Entry entry, const DatasetPtr& old) {
     const std::lock_guard lock(mutex);
-    const auto at = std::find_if(entries.begin(), entries.end(),
-                                 [&](const Entry& known) { return known.dataset == old; });
+    const auto at = std::ranges::find(entries, old, &Entry::dataset);
     if (ended) entry.dataset->end();
     if (at != entries.end()) std::swap(*at, entry);
     return entry;
@@ -318,9 +320,7 @@ Result<void> Store::remove(const std::string& id) {
   {
     const std::lock_guard lock(state_->mutex);
     const State::Entry* found = state_->find(id);
-    if (found == nullptr) {
-      return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
-    }
+    if (found == nullptr) return state_->no_dataset(id);
     removed = found->dataset;
     state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
   }
@@ -336,7 +336,7 @@ Result<DatasetPtr> Store::find(const std::string& id) const {
     return make_error(ErrorKind::not_found, "dataset " + in_quotes(id) +
                                                 " could not be opened: " + failed->listed.problem);
   }
-  return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
+  return state_->no_dataset(id);
 }
 
 void Store::list_failed(const std::string& sample_or_path, const Error& why) {
