@@ -18,6 +18,7 @@
 #include "server/api/embedded_schemas.hpp"
 #include "server/api/operations/operations.hpp"
 #include "server/api/operations/parameters.hpp"
+#include "server/http/cors.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -132,6 +133,25 @@ TEST(OpenApi, BodiesAndAnswersHaveTheirMediaTypesAndSchemas) {
   EXPECT_TRUE(ready.contains("application/problem+json")) << "full";
   EXPECT_EQ(document["components"]["responses"]["TooManyRequests"]["headers"].count("Retry-After"),
             1U);
+}
+
+// Vary is for caches, and a script cannot upgrade a connection.
+TEST(OpenApi, HeadersOfAnswersAreReadableByScriptsOfAllowedOrigins) {
+  const std::string origin = "https://friend.example";
+  http::Request request;
+  request.headers.emplace_back("Origin", origin);
+  http::Response response;
+  http::share_with_origins(response, request, {origin});
+  std::set<std::string> readable{"Vary", "Upgrade"};
+  for (const auto& [name, value] : response.headers) {
+    if (name != "Access-Control-Expose-Headers") continue;
+    for (const std::string_view one : http::split_list(value, ',')) readable.emplace(one);
+  }
+  const Json open = Json::parse(documents::openapi(some_entries(), about_of("/", true)));
+  const Json& headers = open["components"]["headers"];
+  EXPECT_TRUE(headers.contains("Windsplat-Values"));
+  EXPECT_TRUE(headers.contains("WWW-Authenticate"));
+  for (const auto& [name, header] : headers.items()) EXPECT_TRUE(readable.contains(name)) << name;
 }
 
 TEST(OpenApi, TellsBasePathAndToken) {
