@@ -5,7 +5,7 @@ export * from "./wire/api";
 export type { ConnectionState } from "./wire/connection";
 export type { Reach } from "./wire/reach";
 export type { SocketClass } from "./wire/browser_link";
-export { ProblemError, problemText } from "./wire/requests";
+export { ProblemError, problemText, UnreachableError } from "./wire/requests";
 export * from "./view/camera";
 export * from "./client/client";
 export { ViewStream, type StreamEvents, type StreamOptions } from "./client/view_stream";

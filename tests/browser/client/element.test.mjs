@@ -198,7 +198,7 @@ test("a dataset that is not there is told once, in words and as a problem", asyn
   assert.equal(await page.locator("windsplat-view [part=message]").innerText(), "");
 });
 
-test("an invalid view is written on the picture of the default, and the controls work", async (t) => {
+test("an invalid view is written on the default picture, and the controls work", async (t) => {
   const wrong = `<windsplat-view id="a" src="SRC" dataset="climate" controls
     view='{"vector":{"strid":3}}'></windsplat-view>`;
   const page = await shared.pageWith(t, wrong);

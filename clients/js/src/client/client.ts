@@ -2,10 +2,11 @@
 // streams of its views.
 import type { ColorMaps, FrameInfo, Jobs, Presets, SavedView, Service } from "../generated/answers";
 import { Api, type Probe } from "../wire/api";
+import { addressOf, settingsOf } from "../wire/arguments";
 import type { SocketClass } from "../wire/browser_link";
 import { drawFrame, type FetchLike } from "../wire/frame_request";
 import type { View } from "../wire/protocol";
-import { posted } from "../wire/requests";
+import { posted, UnreachableError } from "../wire/requests";
 import { ViewStream, type StreamEvents, type StreamOptions } from "./view_stream";
 
 export interface ClientOptions {
@@ -38,6 +39,18 @@ function authorized(fetch: FetchLike, token: string | undefined): FetchLike {
   };
 }
 
+// With the address in the error of a request that has no answer.
+const reaching =
+  (address: string, fetch: FetchLike): FetchLike =>
+  async (url, init) => {
+    try {
+      return await fetch(url, init);
+    } catch (failure) {
+      if (init.signal?.aborted) throw failure;
+      throw new UnreachableError(address, failure);
+    }
+  };
+
 const isList =
   (key: string) =>
   (answer: Record<string, unknown>): boolean =>
@@ -50,18 +63,17 @@ export class Client extends Api {
   readonly url: string; // ends with a slash
   private readonly send: FetchLike;
 
-  // url: of the server, with its base path.
+  // url: of the server, with its base path; a host with its port counts as http://.
   constructor(
     url: string | URL,
     private readonly options: ClientOptions = {},
   ) {
-    const base = new URL(url);
-    if (!/^https?:$/.test(base.protocol)) throw new TypeError(`${base.href} is no http(s) address`);
+    const base = addressOf(url);
     if (!base.pathname.endsWith("/")) base.pathname += "/";
     base.search = "";
     base.hash = "";
     const fetchIt = options.fetch ?? ((to: string, init: RequestInit) => fetch(to, init));
-    const send = authorized(fetchIt, options.token);
+    const send = reaching(base.href, authorized(fetchIt, options.token));
     super(base.href, (to, init) => send(to, init ?? {}));
     this.url = base.href;
     this.send = send;
@@ -111,8 +123,8 @@ export class Client extends Api {
   }
 
   /** Every field at the sample nearest to a place in the coordinates of the dataset. */
-  probeAt(id: string, place: Place, signal?: AbortSignal): Promise<Probe> {
-    const { fields, ...numbers } = place;
+  async probeAt(id: string, place: Place, signal?: AbortSignal): Promise<Probe> {
+    const { fields, ...numbers } = settingsOf("a place such as { x: 0, y: 0, z: 0 }", place);
     const query = new URLSearchParams(
       Object.entries(numbers)
         .filter(([, value]) => value !== undefined)

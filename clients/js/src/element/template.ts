@@ -5,9 +5,9 @@ const css = `
 :host { display: block; position: relative; aspect-ratio: 8 / 5; overflow: hidden;
   background: #0b0e14; color: #e8ecf2; font: 13px/1.4 system-ui, sans-serif; }
 :host([hidden]) { display: none; }
-.frame { display: grid; grid-template: minmax(0, 1fr) auto / minmax(0, 1fr); height: 100%; }
-canvas { display: block; grid-area: 1 / 1; width: 100%; height: 100%; touch-action: none; cursor: grab;
-  outline: none; }
+.frame { display: grid; height: 100%; grid-template: minmax(0, 1fr) auto / minmax(0, 1fr); }
+canvas { display: block; grid-area: 1 / 1; width: 100%; height: 100%; touch-action: none;
+  cursor: grab; outline: none; }
 canvas.dragging { cursor: grabbing; }
 :host([interactive="false"]) canvas { touch-action: auto; cursor: default; }
 canvas:focus-visible { box-shadow: inset 0 0 0 2px #6cb2ff; }

@@ -12,6 +12,7 @@ import type {
   Series,
 } from "../generated/answers";
 import type { Dataset, DatasetSummary, View } from "./protocol";
+import { indicesOf, nameOf, settingsOf, stepOf } from "./arguments";
 import { notUnderstood, posted, refusal } from "./requests";
 import { isObject } from "../base/values";
 import type { Vec3 } from "../base/vec3";
@@ -85,7 +86,7 @@ export class Api {
     bins: number,
     difference?: Difference,
   ): Promise<Histogram> {
-    const query = `step=${step}&bins=${bins}${minus(difference)}`;
+    const query = `step=${stepOf(step)}&bins=${bins}${minus(difference)}`;
     const path = `${this.field(id, field)}/histogram?${query}`;
     return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
   }
@@ -97,7 +98,7 @@ export class Api {
     step: number | null,
     difference?: Difference,
   ): Promise<FieldRange> {
-    const query = `${step === null ? "of=all" : `step=${step}`}${minus(difference)}`;
+    const query = `${step === null ? "of=all" : `step=${stepOf(step)}`}${minus(difference)}`;
     const path = `${this.field(id, field)}/range?${query}`;
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
   }
@@ -116,12 +117,13 @@ export class Api {
     id: string,
     of: Vec3,
     heights: string | null,
-    { step, difference, derived = [] }: ProbeOf,
+    settings: ProbeOf,
     signal?: AbortSignal,
   ): Promise<Probe> {
+    const { step, difference, derived = [] } = settingsOf("such as { step: 0 }", settings);
     const names = derived.filter((name) => !name.includes(",")).map(encodeURIComponent);
     const fields = names.length === 0 ? "" : `&fields=${names.join(",")}`;
-    const query = `${place(of, heights)}&step=${step}${minus(difference)}${fields}`;
+    const query = `${place(of, heights)}&step=${stepOf(step)}${minus(difference)}${fields}`;
     return this.getProbe(`${this.dataset(id)}/probe?${query}`, { signal: signal ?? null });
   }
 
@@ -142,7 +144,7 @@ export class Api {
     id: string,
     field: string,
     of: Vec3,
-    heights: string | null,
+    heights: string | null = null,
     difference?: Difference,
   ): Promise<Series> {
     const path = `${this.field(id, field)}/series?${place(of, heights)}${minus(difference)}`;
@@ -205,11 +207,11 @@ export class Api {
   }
 
   protected dataset(id: string): string {
-    return `v1/datasets/${encodeURIComponent(id)}`;
+    return `v1/datasets/${encodeURIComponent(nameOf("id", id))}`;
   }
 
   private field(id: string, field: string): string {
-    return `${this.dataset(id)}/fields/${encodeURIComponent(field)}`;
+    return `${this.dataset(id)}/fields/${encodeURIComponent(nameOf("field", field))}`;
   }
 
   protected async get<T>(
@@ -250,5 +252,7 @@ const minus = (difference: Difference): string => {
 };
 
 // Of the sample at these indices; heights: the field that places samples in the view.
-const place = (of: Vec3, heights: string | null): string =>
-  `index=${of.join(",")}${heights === null ? "" : `&heightField=${encodeURIComponent(heights)}`}`;
+const place = (of: Vec3, heights: string | null): string => {
+  const height = heights === null ? "" : `&heightField=${encodeURIComponent(heights)}`;
+  return `index=${indicesOf(of).join(",")}${height}`;
+};

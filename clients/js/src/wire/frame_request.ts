@@ -1,7 +1,7 @@
 // Views -> pictures from POST v1/frames, in order, at most two requests at a time. If the
 // server is busy, the request is repeated after the delay given in its answer.
 import type { View } from "./protocol";
-import { posted, refusal } from "./requests";
+import { posted, refusal, UnreachableError } from "./requests";
 import { clamp } from "../base/values";
 
 export type FetchLike = (url: string, options: RequestInit) => Promise<Response>;
@@ -44,7 +44,8 @@ export async function drawFrame(
       ...posted(view, { Accept: type }),
       signal,
     }).catch((failure: unknown) => {
-      throw signal.aborted ? failure : new Error("The server cannot be reached.");
+      if (signal.aborted || failure instanceof UnreachableError) throw failure;
+      throw new Error("The server cannot be reached.");
     });
     if (response.ok) return response.blob();
     if (tries === triesMax || !busyCodes.includes(response.status)) {

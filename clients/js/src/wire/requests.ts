@@ -17,6 +17,19 @@ export class ProblemError extends Error {
   }
 }
 
+/** A request had no answer: the server is down, its address is wrong, or a browser forbids it. */
+export class UnreachableError extends Error {
+  override name = "UnreachableError";
+
+  constructor(
+    readonly address: string, // of the server
+    override readonly cause: unknown, // the failure as it was reported
+  ) {
+    const { message, cause: reason } = cause as { message?: string; cause?: { code?: string } };
+    super(`no answer from ${address} (${reason?.code ?? message ?? String(cause)})`);
+  }
+}
+
 /** The entries of a problem with their places, or else its detail or title. */
 export function problemText({ title, detail, errors }: Problem): string {
   const entries = errors?.map((entry) => `${entry.pointer}: ${entry.detail}`) ?? [];
