@@ -14,7 +14,16 @@ import {
   type View,
 } from "@windsplat/client";
 import type { Vec3 } from "@windsplat/client/parts";
-import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/view/histogram";
+import {
+  barPath,
+  clipRange,
+  countedText,
+  type Counted,
+  neat,
+  quantile,
+  RangeDrag,
+  valueAt,
+} from "../src/view/histogram";
 import {
   coordinatesOf,
   magnitude,
@@ -28,7 +37,7 @@ import { derivedIn } from "../src/view/view_fields";
 import { described } from "./page";
 import { timeEnds, seriesCurve } from "../src/panels/series_plot";
 
-const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram => ({
+const histogram = (counts: number[], change: Partial<Counted> = {}): Counted => ({
   range: [0, counts.length],
   counts,
   masked: 0,
@@ -39,6 +48,14 @@ const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram
 });
 
 // --- histograms ---------------------------------------------------------------------------
+
+test("a field without values is said to have none, and nothing is chosen of it", async () => {
+  const none: Histogram = { ...histogram([0, 0], { masked: 12 }), range: null };
+  assert.deepEqual(await server(none).api.histogram("d", "t", 0, 2), none);
+  assert.equal(countedText(none, " K"), "no values · 12 masked");
+  assert.equal(clipRange(none, 0.01), null);
+  assert.equal(countedText(histogram([1], { range: [2, 3] }), " K"), "2 to 3 K");
+});
 
 test("quantiles of uniform counts are proportional", () => {
   const even = histogram(Array.from({ length: 100 }, () => 7));

@@ -4,9 +4,8 @@ import { failureText } from "../base/problem_text";
 import type { Histogram, Range } from "@windsplat/client";
 import { checkLabel, make, makeSvg, setAttributes, observeVisibility } from "../base/dom";
 import { debounced, clamp } from "@windsplat/client/parts";
-import { barPath, clipRange, positionOf, RangeDrag, valueAt } from "../view/histogram";
+import { barPath, clipRange, countedText, positionOf, RangeDrag, valueAt } from "../view/histogram";
 import { oriented, RangeChoice, type RangeSource } from "./range_choice";
-import { formatNumber } from "../base/ticks";
 import { TransferView, type CurveSource } from "./transfer_view";
 
 export const histogramBins = 128;
@@ -125,7 +124,9 @@ export class HistogramView {
     on("pointerdown", (event) => {
       if (this.data === null || event.button !== 0) return;
       const near = holdPixels / surface.getBoundingClientRect().width;
-      const ends = (this.source.range() ?? this.data.range).map((end) => this.positionIn(end));
+      const ends = (this.source.range() ?? this.data.range ?? this.domain).map((end) =>
+        this.positionIn(end),
+      );
       surface.setPointerCapture(event.pointerId);
       this.drag = new RangeDrag(place(event), ends as Range, near);
     });
@@ -167,7 +168,7 @@ export class HistogramView {
     const { data, source } = this;
     this.fitDomain();
     const chosen = source.range();
-    this.clip.disabled = data === null;
+    this.clip.disabled = (data?.range ?? null) === null;
     const unit = source.units() === "" ? "" : ` ${source.units()}`;
     this.bars.setAttribute("d", data === null ? "" : barPath(data.counts, this.log.checked));
     const label = `Histogram of ${source.title()}`;
@@ -175,12 +176,9 @@ export class HistogramView {
       this.svg.setAttribute("aria-label", `${label}: none yet`);
       if (!this.caption.classList.contains("failed")) this.caption.textContent = "computing…";
     } else {
-      const [low, high] = data.range.map((end) => formatNumber(end));
-      const masked = data.masked === 0 ? "" : ` · ${formatNumber(data.masked, 6)} masked`;
-      if (!this.caption.classList.contains("failed")) {
-        this.caption.textContent = `${low} to ${high}${unit}${masked}`;
-      }
-      this.svg.setAttribute("aria-label", `${label}, ${low} to ${high}${unit}${masked}`);
+      const text = countedText(data, unit);
+      if (!this.caption.classList.contains("failed")) this.caption.textContent = text;
+      this.svg.setAttribute("aria-label", `${label}, ${text}`);
     }
     const range = data?.range ?? this.domain;
     const bins = data?.counts.length ?? 1;

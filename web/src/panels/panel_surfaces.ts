@@ -172,7 +172,12 @@ class SurfacesPanel {
         const dataset = this.kit.host.dataset();
         const keeps =
           typeof kept === "number" && keepsValue(dataset, before.field, field, kept, histogram);
-        const isovalue = keeps ? kept : (middleValue(histogram) ?? histogram.range[0]);
+        const isovalue = keeps ? kept : (middleValue(histogram) ?? histogram.range?.[0]);
+        if (isovalue === undefined) {
+          this.message = `${field} has no values at this step.`;
+          this.controls.refresh();
+          return;
+        }
         this.update(index, { ...change, field, isovalue });
       },
     );

@@ -4,7 +4,7 @@ import type { FieldRange, Histogram, Dataset, SurfaceView, View } from "@windspl
 import { formatNumber } from "../base/ticks";
 import { dot, length, subtract, times, type Vec3 } from "@windsplat/client/parts";
 import { unitText } from "../view/unit_text";
-import { neat, quantile } from "../view/histogram";
+import { hasValues, neat, quantile } from "../view/histogram";
 
 export type Axis = "x" | "y" | "z";
 
@@ -16,6 +16,7 @@ const fieldNamed = (dataset: Dataset, name: string) =>
 
 // A value in the middle of most samples; null if all are equal or masked.
 export function middleValue(histogram: Histogram): number | null {
+  if (!hasValues(histogram)) return null;
   const { range, counts } = histogram;
   const width = range[1] - range[0];
   if (!(width > 0) || !counts.some((count) => count > 0)) return null;
@@ -75,6 +76,7 @@ export function keepsValue(
   histogram: Histogram,
 ): boolean {
   const units = (name: string) => unitText(fieldNamed(dataset, name)?.units);
+  if (!hasValues(histogram)) return false;
   const [low, high] = histogram.range;
   return units(from) === units(to) && value > low && value < high;
 }

@@ -1,6 +1,21 @@
 // Histogram calculations: bars, quantiles, and ranges chosen by dragging. Pure.
 import type { Histogram, Range } from "@windsplat/client";
+import { formatNumber } from "../base/ticks";
 import { clamp } from "@windsplat/client/parts";
+
+/** A histogram of a field that has values. */
+export type Counted = Histogram & { range: Range };
+
+export const hasValues = (histogram: Histogram): histogram is Counted => histogram.range !== null;
+
+// What was counted, in words. unit: with a space before it, or empty.
+export function countedText(histogram: Histogram, unit: string): string {
+  const { masked } = histogram;
+  const rest = masked === 0 ? "" : ` · ${formatNumber(masked, 6)} masked`;
+  if (!hasValues(histogram)) return `no values${rest}`;
+  const [low, high] = histogram.range.map((end) => formatNumber(end));
+  return `${low} to ${high}${unit}${rest}`;
+}
 
 // Outline of the bars as an SVG path; each bar is one unit wide and at most 1 high, y downward.
 export function barPath(counts: number[], log: boolean): string {
@@ -13,7 +28,7 @@ export function barPath(counts: number[], log: boolean): string {
 
 // The value below which the fraction `share` of the unmasked samples lies; samples are assumed
 // uniform within a bin.
-export function quantile({ range, counts, below, above }: Histogram, share: number): number {
+export function quantile({ range, counts, below, above }: Counted, share: number): number {
   const width = (range[1] - range[0]) / counts.length;
   const total = counts.reduce((sum, count) => sum + count, below + above);
   let left = share * total - below;
@@ -28,6 +43,7 @@ export function quantile({ range, counts, below, above }: Histogram, share: numb
 
 // The range without the fraction `tail` of the samples at either end; null if it would be empty.
 export function clipRange(histogram: Histogram, tail: number): Range | null {
+  if (!hasValues(histogram)) return null;
   const low = neat(quantile(histogram, tail), histogram.range);
   const high = neat(quantile(histogram, 1 - tail), histogram.range);
   return low < high ? [low, high] : null;

@@ -38,8 +38,8 @@ export type {
 export type Range = [number, number];
 export type Value = ProbedValue | (number | null)[]; // null: masked
 
-/** Ends of the first and the last bin are known. */
-export type Histogram = Answered.Histogram & { range: Range };
+/** range: ends of the first and the last bin; null: there are no values. */
+export type Histogram = Answered.Histogram;
 
 /** The sample that contributes most to a pixel. */
 export type Feature = NonNullable<PickedFeature>;
@@ -88,7 +88,9 @@ export class Api {
   ): Promise<Histogram> {
     const query = `step=${stepOf(step)}&bins=${bins}${minus(difference)}`;
     const path = `${this.field(id, field)}/histogram?${query}`;
-    return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
+    const looksRight = (a: Record<string, unknown>) =>
+      (a.range === null || isRange(a.range)) && Array.isArray(a.counts);
+    return this.get<Histogram>(path, looksRight);
   }
 
   /** The range of one step, or with null of all steps, which may take a long time. */
