@@ -49,9 +49,9 @@ http::Response get_problem_types(const std::string& base_path, const http::Reque
   for (const ProblemType& type : protocol::problem_types()) {
     const std::string heading = heading_of(type);
     const std::string path = base_path + protocol::problem_reference(type);
-    text += heading + "\n  " + std::string(type.explanation) + "\n\n";
-    html += "<dt><a href=\"" + path + "\">" + heading + "</a></dt><dd>" +
-            std::string(type.explanation) + "</dd>";
+    text.append(heading).append("\n  ").append(type.explanation).append("\n\n");
+    html.append("<dt><a href=\"").append(path).append("\">").append(heading);
+    html.append("</a></dt><dd>").append(type.explanation).append("</dd>");
   }
   return page_of(request, "Problem types of windsplat", text, html + "</dl>");
 }

@@ -55,7 +55,7 @@ Result<void> Listener::listen(const api::ListenPlace& place) {
     return make_error(ErrorKind::internal, "cannot listen on " + printable(place.address) +
                                                ": the address is not numeric");
   }
-  if (const auto ok = place.socket < 0 ? bind_tcp(ip, place) : adopt(ip, place.socket); !ok) {
+  if (auto ok = place.socket < 0 ? bind_tcp(ip, place) : adopt(ip, place.socket); !ok) {
     return ok;
   }
   port_ = port_of(acceptor_.native_handle());

@@ -84,7 +84,7 @@ struct Server::State {
             accepted(std::move(socket), over_tcp);
           },
           [this] { parts.metrics.accept_failed(); });
-      const auto bound = listener->listen(place);
+      auto bound = listener->listen(place);
       if (bound) {
         listeners.push_back(std::move(listener));
       } else if (!place.may_lack || bound.error().kind != ErrorKind::not_found) {

@@ -18,6 +18,7 @@ std::string joined(const std::vector<std::string>& words, std::string_view betwe
 
 std::vector<std::string> names_of(const std::vector<CommandText>& commands) {
   std::vector<std::string> out;
+  out.reserve(commands.size());
   for (const CommandText& command : commands) out.push_back(command.name);
   return out;
 }
