@@ -70,7 +70,8 @@ http::Response open_upload(const ServerOptions& options, tasks::Backend& backend
   const auto& uploads = options.uploads;
   if (!uploads) {
     return http::problem_response(403, "Forbidden",
-                                  "uploads are disabled: start the server with --upload-limit");
+                                  "uploads are disabled: start the server with --upload-limit "
+                                  "and --state-dir");
   }
   const auto refuse = [](const Error& error) {
     return http::problem_response(make_error_at(error.kind, "/upload", error.message));

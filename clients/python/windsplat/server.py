@@ -19,8 +19,6 @@ from .dataset import Dataset
 from .errors import (
     JobTimeout,
     NotFound,
-    Problem,
-    Unauthorized,
     WindsplatError,
     problem_of,
 )
@@ -192,16 +190,8 @@ class Server:
         suffix = whole.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,12}", whole.suffix) else ""
         name = f"{stem}-{secrets.token_hex(8)}{suffix}"
         value = base64.b64encode(digest.digest()).decode()
-        try:
-            self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
-                              headers={"Content-Digest": f"sha-256=:{value}:"})
-        except Problem as problem:
-            if problem.status != 413 or problem.type == "about:blank":  # or that of a proxy
-                raise
-            # The limit of other bodies, met before uploads are known to be disabled.
-            raise Unauthorized(403, "Forbidden", "uploads are disabled: start the server with "
-                               "--upload-limit and --state-dir",
-                               request_id=problem.request_id) from problem
+        self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
+                          headers={"Content-Digest": f"sha-256=:{value}:"})
         try:
             dataset = self._opened({"upload": name}, timeout)
         except BaseException:

@@ -22,7 +22,8 @@ using uploads::Incoming;
 
 http::Response uploads_are_off() {
   return http::problem_response(403, "Forbidden",
-                                "uploads are disabled: start the server with --upload-limit");
+                                "uploads are disabled: start the server with --upload-limit "
+                                "and --state-dir");
 }
 
 // Writes on a thread of the executor.

@@ -353,10 +353,6 @@ class Uploads(unittest.TestCase):
         self.path.write_bytes(bytes(100_000))  # more than other bodies may have
         with self.assertRaisesRegex(windsplat.Unauthorized, "--upload-limit and --state-dir"):
             shared_server()[0].upload(self.path)
-        with Prepared((413, {}, "of a proxy")) as there:
-            with self.assertRaises(windsplat.Problem) as caught:
-                windsplat.Server(there.url).upload(self.path)
-            self.assertEqual(caught.exception.status, 413)
 
     def test_an_upload_that_cannot_be_opened_is_removed(self):
         with Prepared((201, {}, {}), (422, {}, problem(422)), (204, {}, {})) as there:
