@@ -1,8 +1,9 @@
-# Tests of the Python client (clients/python) against the real daemon, by Debian's Python.
+# Tests of the Python client (clients/python) against the real daemon, by Debian's Python. They begin
+# early (COST), since they wait for kernels and daemons.
 function(windsplat_python_test name)
   add_test(NAME clients.python_${name} COMMAND ${SYSTEM_PYTHON} -W ignore -m unittest ${ARGN}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}/tests/clients/python)
-  set_tests_properties(clients.python_${name} PROPERTIES LABELS integration TIMEOUT 600
+  set_tests_properties(clients.python_${name} PROPERTIES LABELS integration TIMEOUT 600 COST 500
     ENVIRONMENT "PYTHONDONTWRITEBYTECODE=1;WINDSPLAT=$<TARGET_FILE:windsplat>")
 endfunction()
 
