@@ -1,5 +1,5 @@
-# Tests of the Python client (clients/python) against the real daemon, by Debian's Python. They begin
-# early (COST), since they wait for kernels and daemons.
+# Tests of the Python client (clients/python) against the real daemon, by Debian's Python. They
+# begin early (COST), since they wait for kernels and daemons.
 function(windsplat_python_test name)
   add_test(NAME clients.python_${name} COMMAND ${SYSTEM_PYTHON} -W ignore -m unittest ${ARGN}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}/tests/clients/python)
