@@ -125,7 +125,6 @@ std::vector<Route> picture_routes(const std::string& base_path, access::Admissio
             later(post_reference, backend, admission, base_path), Charge::valid_picture},
       Route{"GET", "/v1/references/{id}", operations::read_reference(),
             at_once(get_reference, backend.references)},
-
   };
 }
 

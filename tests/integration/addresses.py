@@ -5,7 +5,6 @@ Usage: addresses.py --program=PATH [unittest arguments]
 """
 import json
 import pathlib
-import sys
 import tempfile
 import unittest
 import urllib.parse
@@ -13,9 +12,9 @@ import urllib.parse
 import netCDF4
 import numpy as np
 
-from served import Daemon
+from served import Daemon, taken_program, write_columns
 
-PROGRAM = None
+PROGRAM = taken_program()
 HOURS = (0, 6, 12, 24)
 LONGITUDES, LATITUDES = np.arange(0, 360, 15.0), np.arange(-75, 76, 15.0)
 LEVELS = (1000.0, 700.0, 400.0)
@@ -48,22 +47,6 @@ def write_globe(path, calendar="standard", since="2001-02-28"):
             variable = file.createVariable(name, "f4", tuple(axes))
             variable.standard_name, variable.units = standard, units
             variable[:] = rng.random(shape) * (1 if name == "cloud" else 20)
-
-
-def write_columns(path):
-    """A map whose columns have longitudes and latitudes of their own."""
-    with netCDF4.Dataset(path, "w") as file:
-        file.createDimension("y", 9)
-        file.createDimension("x", 12)
-        rows, columns = np.meshgrid(np.arange(9), np.arange(12), indexing="ij")
-        for name, units, values in (("lat", "degrees_north", 48 + 0.5 * rows + 0.1 * columns),
-                                    ("lon", "degrees_east", 10 + 0.5 * columns - 0.1 * rows)):
-            axis = file.createVariable(name, "f8", ("y", "x"))
-            axis.units = units
-            axis[:] = values
-        variable = file.createVariable("t", "f4", ("y", "x"))
-        variable.units, variable.coordinates = "K", "lon lat"
-        variable[:] = rows * 100 + columns
 
 
 class Addresses(unittest.TestCase):
@@ -352,12 +335,5 @@ class Probes(unittest.TestCase):
             self.assertIn(text, detail)
 
 
-def main():
-    global PROGRAM
-    given = [one for one in sys.argv[1:] if one.startswith("--program=")]
-    PROGRAM = given[0].partition("=")[2] if given else "build/release/windsplat"
-    unittest.main(argv=[sys.argv[0], *(one for one in sys.argv[1:] if one not in given)])
-
-
 if __name__ == "__main__":
-    main()
+    unittest.main()

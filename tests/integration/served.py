@@ -2,8 +2,35 @@
 import http.client
 import json
 import subprocess
+import sys
 import time
 import urllib.parse
+
+import netCDF4
+import numpy as np
+
+
+def taken_program():
+    """The program named by --program=PATH, an argument that is removed for unittest."""
+    given = [one for one in sys.argv[1:] if one.startswith("--program=")]
+    sys.argv[1:] = [one for one in sys.argv[1:] if one not in given]
+    return given[0].partition("=")[2] if given else "build/release/windsplat"
+
+
+def write_columns(path):
+    """A map whose columns have longitudes and latitudes of their own."""
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("y", 9)
+        file.createDimension("x", 12)
+        rows, columns = np.meshgrid(np.arange(9), np.arange(12), indexing="ij")
+        for name, units, values in (("lat", "degrees_north", 48 + 0.5 * rows + 0.1 * columns),
+                                    ("lon", "degrees_east", 10 + 0.5 * columns - 0.1 * rows)):
+            axis = file.createVariable(name, "f8", ("y", "x"))
+            axis.units = units
+            axis[:] = values
+        variable = file.createVariable("t", "f4", ("y", "x"))
+        variable.units, variable.coordinates = "K", "lon lat"
+        variable[:] = rows * 100 + columns
 
 
 class Answer:

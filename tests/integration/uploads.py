@@ -13,7 +13,6 @@ import pathlib
 import socket
 import stat
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
@@ -22,9 +21,9 @@ import zipfile
 import netCDF4
 import numpy as np
 
-from served import Daemon
+from served import Daemon, taken_program
 
-PROGRAM = None
+PROGRAM = taken_program()
 LIMIT = 4 << 20
 
 
@@ -415,12 +414,5 @@ class Archives(WithUploads):
         self.assertEqual(self.put("all.raw", bytes(LIMIT // 2)).status, 201)
 
 
-def main():
-    global PROGRAM
-    given = [one for one in sys.argv[1:] if one.startswith("--program=")]
-    PROGRAM = given[0].partition("=")[2] if given else "build/release/windsplat"
-    unittest.main(argv=[sys.argv[0], *(one for one in sys.argv[1:] if one not in given)])
-
-
 if __name__ == "__main__":
-    main()
+    unittest.main()

@@ -6,16 +6,15 @@ Usage: values.py --program=PATH [unittest arguments]
 import io
 import json
 import pathlib
-import sys
 import tempfile
 import unittest
 
 import netCDF4
 import numpy as np
 
-from served import Daemon
+from served import Daemon, taken_program, write_columns
 
-PROGRAM = None
+PROGRAM = taken_program()
 LIMIT = 64 << 20
 LONGITUDES = np.arange(0, 360, 10.0)
 LATITUDES = np.arange(80, -81, -20.0)  # north first in the file
@@ -44,22 +43,6 @@ def write_globe(path, seed=3):
             if name == "t":
                 data[rng.random(data.shape) < 0.1] = -999
             variable[:] = data.astype("f4")
-
-
-def write_columns(path):
-    """A map whose columns have longitudes and latitudes of their own."""
-    with netCDF4.Dataset(path, "w") as file:
-        file.createDimension("y", 9)
-        file.createDimension("x", 12)
-        rows, columns = np.meshgrid(np.arange(9), np.arange(12), indexing="ij")
-        for name, units, values in (("lat", "degrees_north", 48 + 0.5 * rows + 0.1 * columns),
-                                    ("lon", "degrees_east", 10 + 0.5 * columns - 0.1 * rows)):
-            axis = file.createVariable(name, "f8", ("y", "x"))
-            axis.units = units
-            axis[:] = values
-        variable = file.createVariable("t", "f4", ("y", "x"))
-        variable.units, variable.coordinates = "K", "lon lat"
-        variable[:] = rows * 100 + columns
 
 
 def write_large(path):
@@ -259,12 +242,5 @@ class Values(unittest.TestCase):
         self.assert_refused(self.ask("", "nothing"), "nothing", status=404)
 
 
-def main():
-    global PROGRAM
-    given = [one for one in sys.argv[1:] if one.startswith("--program=")]
-    PROGRAM = given[0].partition("=")[2] if given else "build/release/windsplat"
-    unittest.main(argv=[sys.argv[0], *(one for one in sys.argv[1:] if one not in given)])
-
-
 if __name__ == "__main__":
-    main()
+    unittest.main()

@@ -15,7 +15,7 @@ test("a host with its port is an address; what is none is named", () => {
   }
 });
 
-test("a server without an answer is told by its address", async () => {
+test("the error of a server without an answer names its address", async () => {
   const cause = Object.assign(new TypeError("fetch failed"), { cause: { code: "ECONNREFUSED" } });
   const down = new Client("127.0.0.1:18881", { fetch: () => Promise.reject(cause) });
   const asks = [() => down.datasets(), () => down.frame({}), () => down.describe("a")];

@@ -193,7 +193,7 @@ test("a change is answered by the frame shown before if it changes nothing visib
   assert.equal(await final, 1);
 });
 
-test("a refused change is told and taken back, and an unknown dataset is told once", async () => {
+test("a refused change is reported and reverted, and an unknown dataset is reported once", async () => {
   const errors: ProblemError[] = [];
   const { stream, socket } = open({ dataset: "a" }, { refused: (error) => errors.push(error) });
   socket.hello("a");
@@ -315,7 +315,7 @@ test("refusals of saved views and probes are typed problems; parameters are enco
   ]);
 });
 
-test("a problem is told by all of its entries, else by its detail or title", () => {
+test("the text of a problem has all of its entries, else its detail or title", () => {
   const problem = { type: "about:blank", title: "Unprocessable", status: 422, detail: "/a: wrong" };
   const errors = [
     { pointer: "/a", detail: "wrong" },

@@ -29,7 +29,7 @@ def orbited(camera: Mapping[str, Any], dx: float, dy: float) -> dict[str, Any]:
     distance = math.hypot(*away)
     level = math.hypot(away[0], away[1])
     elevation = math.degrees(math.atan2(away[2], level))
-    # Straight from above the azimuth is told by what is up in the picture.
+    # Straight from above the azimuth follows from what is up in the picture.
     x, y = (away[0], away[1]) if level > 1e-6 * distance else (-camera["up"][0], -camera["up"][1])
     azimuth = math.degrees(math.atan2(x, -y)) - DEGREES_PER_PIXEL * dx
     elevation = max(-STEEPEST, min(STEEPEST, elevation + DEGREES_PER_PIXEL * dy))

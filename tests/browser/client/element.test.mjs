@@ -183,7 +183,7 @@ test("playback shows one step after another", async (t) => {
   assert.equal(await page.evaluate(() => document.querySelector("#a").step), step);
 });
 
-test("a dataset that is not there is told once, in words and as a problem", async (t) => {
+test("an unknown dataset is reported once, in words and as a problem", async (t) => {
   const page = await shared.pageWith(t, tornado.replace('"tornado"', '"gone"'));
   const { detail } = await event(page, "error");
   assert.equal(detail.kind, "dataset");

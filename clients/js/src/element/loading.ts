@@ -1,4 +1,4 @@
-// What the server loads, shown without covering the picture: a line at its lower edge, or in words
+// Progress of loading, shown without covering the picture: a line at its lower edge, or in words
 // where there is no picture yet. Short loads, as of every step of a playback, are not shown.
 import type { ProgressMessage } from "../wire/protocol";
 import type { Inside } from "./template";
