@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +16,8 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+
+#include "server/base/spawn.hpp"
 
 namespace windsplat::movie {
 namespace {
@@ -45,44 +46,16 @@ std::vector<std::string> environment_of_child() {
   return out;
 }
 
-std::vector<char*> pointers(std::vector<std::string>& words) {
-  std::vector<char*> out;
-  out.reserve(words.size() + 1);
-  for (std::string& word : words) out.push_back(word.data());
-  out.push_back(nullptr);
-  return out;
-}
-
 struct Ends {
   int input, output, errors, file;  // of the child; file -1: none
 };
 
-int spawn(const std::string& program, std::vector<std::string>& words, const Ends& ends,
-          pid_t& id) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends.input, 0);
-  posix_spawn_file_actions_adddup2(&actions, ends.output, 1);
-  posix_spawn_file_actions_adddup2(&actions, ends.errors, 2);
-  if (ends.file >= 0) posix_spawn_file_actions_adddup2(&actions, ends.file, file_of_child);
-  posix_spawn_file_actions_addclosefrom_np(&actions, file_of_child + (ends.file >= 0 ? 1 : 0));
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigset_t all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  std::vector<std::string> variables = environment_of_child();
-  const int fault = ::posix_spawn(&id, program.c_str(), &actions, &attributes,
-                                  pointers(words).data(), pointers(variables).data());
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  return fault;
+int start_with(const std::string& program, std::vector<std::string> words, const Ends& ends,
+               pid_t& id) {
+  std::vector<PassedDescriptor> passed{{ends.input, 0}, {ends.output, 1}, {ends.errors, 2}};
+  if (ends.file >= 0) passed.push_back({ends.file, file_of_child});
+  return spawn(program, std::move(words), environment_of_child(), passed,
+               file_of_child + (ends.file >= 0 ? 1 : 0), id);
 }
 
 }  // namespace
@@ -111,7 +84,7 @@ Result<Child> Child::start(const std::string& program, std::vector<std::string> 
   arguments.insert(arguments.begin(), child.name_);
   const Ends ends{input.number(), (keeps == Keeps::all ? errors : null).number(), errors.number(),
                   copy.number()};
-  if (const int fault = spawn(program, arguments, ends, child.id_); fault != 0) {
+  if (const int fault = start_with(program, std::move(arguments), ends, child.id_); fault != 0) {
     child.id_ = -1;
     return not_started(program, fault);
   }

@@ -2,7 +2,6 @@
 #include "server/data/loader/process.hpp"
 
 #include <fcntl.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -21,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/spawn.hpp"
 #include "server/data/cf/grid/crs_wkt.hpp"
 #include "server/data/loader/confine.hpp"
 
@@ -80,43 +80,12 @@ std::vector<std::string> environment_of_loader() {
   return out;
 }
 
-std::vector<char*> pointers(std::vector<std::string>& words) {
-  std::vector<char*> out;
-  out.reserve(words.size() + 1);
-  for (std::string& word : words) out.push_back(word.data());
-  out.push_back(nullptr);
-  return out;
-}
-
-int spawn(const std::string& program, int null, int socket, int life, pid_t& id) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, null, 0);
-  posix_spawn_file_actions_adddup2(&actions, null, 1);
-  if (!messages_are_shown) posix_spawn_file_actions_adddup2(&actions, null, 2);
-  posix_spawn_file_actions_adddup2(&actions, socket, socket_of_loader);
-  posix_spawn_file_actions_adddup2(&actions, life, life_of_loader);
-  posix_spawn_file_actions_addclosefrom_np(&actions, life_of_loader + 1);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigset_t all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  // A separate process group: a terminal sends signals to the group of the daemon only, which ends
-  // its loaders.
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  std::vector<std::string> words{"windsplat", "load"};
-  std::vector<std::string> variables = environment_of_loader();
-  const int fault = ::posix_spawn(&id, program.c_str(), &actions, &attributes,
-                                  pointers(words).data(), pointers(variables).data());
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  return fault;
+int start_loader(const std::string& program, int null, int socket, int life, pid_t& id) {
+  std::vector<PassedDescriptor> passed{
+      {null, 0}, {null, 1}, {socket, socket_of_loader}, {life, life_of_loader}};
+  if (!messages_are_shown) passed.push_back({null, 2});
+  return spawn(program, {"windsplat", "load"}, environment_of_loader(), passed, life_of_loader + 1,
+               id);
 }
 
 std::string how_it_ended(int status) {
@@ -141,7 +110,8 @@ Result<void> Process::start(const std::string& program) {
   const auto null = null_device();
   if (!null) return null.error();
   pid_t id = -1;
-  if (const int fault = spawn(program, *null, theirs.number(), life.number(), id); fault != 0) {
+  if (const int fault = start_loader(program, *null, theirs.number(), life.number(), id);
+      fault != 0) {
     return not_started(fault);
   }
   const std::lock_guard lock(mutex_);
