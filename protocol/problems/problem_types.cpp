@@ -11,15 +11,14 @@ constexpr std::string_view folder = "problems/";
 constexpr std::array<ProblemType, 26> table{{
     {"malformed", 400, "Bad Request",
      "The request cannot be parsed: broken JSON, an invalid query or header. Correct it; sending "
-     "it "
-     "again does not help."},
+     "it again does not help."},
     {"unauthorized", 401, "Unauthorized",
      "The server requires a token, or the one that was sent is wrong. Send Authorization: Bearer "
      "TOKEN."},
     {"forbidden", 403, "Forbidden",
-     "The server does not permit this: a page of an origin that is not allowed, a file outside of "
-     "what may be opened, or a dataset that may not be removed. The detail names the option that "
-     "would permit it, if there is one."},
+     "The server does not permit this: a page of an origin that is not allowed, a file outside "
+     "of what may be opened, or a dataset that may not be removed. The detail names the option "
+     "that would permit it, if there is one."},
     {"not-found", 404, "Not Found",
      "There is no such path, dataset, view, job or picture, or it was removed in the meantime."},
     {"method-not-allowed", 405, "Method Not Allowed",
@@ -32,16 +31,14 @@ constexpr std::array<ProblemType, 26> table{{
     {"length-required", 411, "Length Required",
      "A request with a body must have Content-Length. Chunked bodies are not supported."},
     {"precondition-failed", 412, "Precondition Failed",
-     "The resource has changed since it was read, so that If-Match or If-None-Match does not hold. "
-     "Read it again, and repeat the change on what it is now."},
+     "The resource has changed since it was read, so that If-Match or If-None-Match does not "
+     "hold. Read it again, and repeat the change on what it is now."},
     {"too-large", 413, "Content Too Large",
      "The body, the picture or the work that the request asks for exceeds a limit. The detail "
-     "names "
-     "the limit."},
+     "names the limit."},
     {"unsupported-media-type", 415, "Unsupported Media Type",
      "The resource does not take bodies of this Content-Type or Content-Encoding, or the body is "
-     "no "
-     "gzip although its header says so."},
+     "no gzip although its header says so."},
     {"expectation-failed", 417, "Expectation Failed",
      "The header Expect asks for something other than 100-continue."},
     {"unknown-host", 421, "Misdirected Request",
@@ -49,8 +46,8 @@ constexpr std::array<ProblemType, 26> table{{
      "--allow-host."},
     {"invalid-value", 422, "Unprocessable Content",
      "The document or query can be parsed, but a value is unknown, out of its range or at odds "
-     "with "
-     "another. Each entry of errors has the JSON pointer of a value and what is wrong with it."},
+     "with another. Each entry of errors has the JSON pointer of a value and what is wrong with "
+     "it."},
     {"unreadable-data", 422, "Unprocessable Content",
      "A file is damaged, or in a form that is not supported. The detail names it."},
     {"upgrade-required", 426, "Upgrade Required",
