@@ -193,7 +193,7 @@ test("a change is answered by the frame shown before if it changes nothing visib
   assert.equal(await final, 1);
 });
 
-test("a refused change is reported and reverted, and an unknown dataset is reported once", async () => {
+test("refused changes are reported and reverted; unknown datasets are reported once", async () => {
   const errors: ProblemError[] = [];
   const { stream, socket } = open({ dataset: "a" }, { refused: (error) => errors.push(error) });
   socket.hello("a");
