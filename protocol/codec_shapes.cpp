@@ -211,6 +211,7 @@ Json dataset_json(const DatasetDescription& dataset) {
   out["choices"] = std::move(choices);
   out["steps"] = {{"count", dataset.steps.size()}, {"times", std::move(times)}};
   out["timeUnits"] = dataset.time_units;
+  out["timeCalendar"] = dataset.time_calendar;
   out["bytesWhenResident"] = dataset.bytes_when_resident;
   if (!dataset.default_view.dataset.empty()) {
     out["defaultView"] = view_to_json(dataset.default_view);

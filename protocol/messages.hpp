@@ -126,6 +126,7 @@ struct DatasetDescription {
   // The long form as JSON if encoded in advance; it is then sent instead, and steps and axes may be
   // omitted.
   std::shared_ptr<const std::string> encoded;
+  std::string time_calendar;  // of CF, as in the file; empty: standard
 };
 // Streamlets of a view, traced once for all frames that show them.
 struct StreamletCounts {

@@ -212,6 +212,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   add_bounded(unread, out.notes);
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;
+  out.time_calendar = info.time_calendar;
   out.resident_bytes = dataset.resident_bytes();
   out.bytes_when_resident = components * info.grid.samples() * sizeof(float) * info.steps.size();
   out.default_view.dataset = info.id;

@@ -62,6 +62,7 @@ DatasetDescription climate() {
   dataset.choices = {{"number", 3, {"0", "1", "2"}, "1"}};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
   dataset.time_units = "hours since 2001-01-01";
+  dataset.time_calendar = "noleap";
   dataset.resident_bytes = 48;
   dataset.bytes_when_resident = 5'000'000'000;
   dataset.default_view.dataset = "climate";
@@ -242,6 +243,7 @@ TEST(Shapes, DatasetInFull) {
   EXPECT_EQ(dataset["choices"],
             Json::parse(R"([{"name":"number","length":3,"values":["0","1","2"],"chosen":"1"}])"));
   EXPECT_EQ(dataset["timeUnits"], "hours since 2001-01-01");
+  EXPECT_EQ(dataset["timeCalendar"], "noleap");
   EXPECT_EQ(dataset["residentBytes"], 48);
   EXPECT_EQ(dataset["bytesWhenResident"], 5'000'000'000);
   EXPECT_EQ(dataset["defaultView"].dump(), encode_view(climate().default_view));
