@@ -3,10 +3,11 @@ from __future__ import annotations
 
 import dataclasses
 import html
+import math
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from ._documents import suggestion
-from ._times import step_of
+from ._times import CALENDARS, SAME, dates_of, is_date, moment_of, step_of
 from .errors import NotFound
 from .view import View
 
@@ -137,6 +138,7 @@ class Dataset:
         self.upload_id: str | None = None
         """Name of the upload that it was opened from by Server.upload."""
         self._description: dict[str, Any] | None = None
+        self._moments: list[int] | None = None
 
     @property
     def description(self) -> dict[str, Any]:
@@ -149,6 +151,7 @@ class Dataset:
     def refresh(self) -> None:
         """Forgets the description, for example after the files have changed."""
         self._description = None
+        self._moments = None
 
     @property
     def title(self) -> str:
@@ -174,32 +177,53 @@ class Dataset:
                 for index, one in enumerate(self.description["steps"]["times"])]
 
     @property
+    def calendar(self) -> str | None:
+        """The CF calendar of the dates of the steps: standard, proleptic_gregorian, julian,
+        noleap, all_leap or 360_day; None: the steps have no dates."""
+        texts = self.description["steps"]["times"]
+        if " since " not in (self.description.get("timeUnits") or "") or not (
+                texts and is_date(texts[0]["text"])):
+            return None
+        return CALENDARS.get(self.description.get("timeCalendar", "").strip().lower())
+
+    @property
     def times(self) -> NDArray[Any]:
-        """The times of the steps as numpy's datetime64[ms], UTC; without dates float64
-        coordinates. Raises ValueError for dates that no other calendar has (30 February)."""
+        """The times of the steps as numpy's datetime64[ms], UTC; in calendars that it lacks as
+        objects of cftime, or as texts without that package; without dates float64 coordinates."""
         return self._as_times(self.description["steps"]["times"])
 
     def _as_times(self, times: list[Mapping[str, Any]]) -> NDArray[Any]:
         import numpy as np
 
-        if " since " not in (self.description.get("timeUnits") or ""):
+        calendar = self.calendar
+        if calendar is None:
             return np.array([one["value"] for one in times], dtype=np.float64)
-        texts = [str(one["text"]).removesuffix("Z") for one in times]
-        try:
-            return np.array(texts, dtype="datetime64[ms]")
-        except ValueError as error:
-            raise ValueError(f"{self.id}: {error}: its calendar has dates that datetime64 has "
-                             "not; see dataset.steps") from None
+        return dates_of([str(one["text"]) for one in times], calendar)
 
     def step_at(self, time: Any, *, nearest: bool = False) -> int:
-        """The step at a time: a text as 2001-01-01T06:00 (UTC, or with an offset), datetime or
-        datetime64; a number where the steps have no dates.
+        """The step at a time: a text as 2001-01-01T06:00 (UTC, or with an offset) in the calendar
+        of the dataset, a datetime, datetime64 or time of cftime; a number where the steps have no
+        dates.
 
         nearest: take the nearest step, of two the earlier, where there is none at that time.
 
-        Raises InvalidView with the steps before and after it if there is none.
+        Raises InvalidView with the steps before and after it if there is none, ValueError for
+        what is no time of the calendar.
         """
-        return step_of(self.times, time, nearest, [step.text for step in self.steps])
+        calendar = self.calendar
+        steps = self.steps
+        texts = [step.text for step in steps]
+        if calendar is not None:
+            if self._moments is None:
+                self._moments = [moment_of(text, calendar) for text in texts]
+            return step_of(self._moments, moment_of(time, calendar), nearest, texts, time)
+        values = [step.value for step in steps]
+        try:
+            wanted = float(time)
+        except (TypeError, ValueError):
+            raise ValueError(f"{time!r} is no time: the steps have no dates, give a number from "
+                             f"{min(values):g} to {max(values):g}") from None
+        return step_of(values, wanted, nearest, texts, time, SAME)
 
     def _step(self, step: int | None, time: Any, nearest: bool) -> int:
         """The step of a request: number, or time; without either the first."""
@@ -332,10 +356,11 @@ class Dataset:
                       description.get("units", ""), description["step"], description)
 
     def range(self, field: str, *, step: int | None = None) -> tuple[float, float]:
-        """Least and greatest value of a field at a step; None: at all steps."""
+        """Least and greatest value of a field at a step; None: at all steps. NaN: all samples are
+        masked."""
         document = self.server.http.get(f"{self._field(field)}/range", step=step,
                                         of="all" if step is None else "step")
-        low, high = document["range"]
+        low, high = document["range"] or (math.nan, math.nan)
         return low, high
 
     def close(self, forget: bool = False) -> None:
