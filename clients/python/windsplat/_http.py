@@ -2,12 +2,17 @@
 from __future__ import annotations
 
 import contextlib
+import email.utils
 import ipaddress
+import os
 import pathlib
 import random
+import re
+import socket
 import ssl
 import time
-from typing import Any, Mapping
+import urllib.parse
+from typing import Any, BinaryIO, Callable, Iterator, Mapping
 
 import httpx
 
@@ -20,10 +25,30 @@ def base_of(url: str) -> str:
     """The address of a server, with its base path, ending in a slash."""
     if "://" not in url:
         url = "http://" + url
-    parsed = httpx.URL(url)
+    try:
+        parsed = httpx.URL(url)
+    except httpx.InvalidURL:
+        parsed = httpx.URL("")
     if parsed.scheme not in ("http", "https") or not parsed.host:
-        raise ValueError(f"'{url}' is not an address such as http://127.0.0.1:8080")
+        raise ValueError(f"'{url}' is no address such as http://127.0.0.1:8080 or unix:/run/w.sock")
     return str(parsed.copy_with(query=None, fragment=None)).rstrip("/") + "/"
+
+
+def socket_of(url: str) -> tuple[str, str] | None:
+    """Path of the UNIX socket and address of requests of unix:/run/w.sock, or of what `serve`
+    prints, http+unix://%2Frun%2Fw.sock/base/. None: another address."""
+    if url.startswith("unix:"):
+        path, rest = url.removeprefix("unix:"), ""
+    elif url.startswith("http+unix://"):
+        host, _, rest = url.removeprefix("http+unix://").partition("/")
+        path = urllib.parse.unquote(host)
+    else:
+        return None
+    if not path.startswith("/") or path.startswith("//"):
+        raise ValueError(f"'{url}' is not unix: and an absolute path, such as unix:/run/w.sock")
+    if not hasattr(socket, "AF_UNIX"):
+        raise ValueError(f"'{url}': Python has no UNIX sockets on this system")
+    return path, base_of("http://localhost/" + rest)
 
 
 def is_loopback(host: str) -> bool:
@@ -35,9 +60,15 @@ def is_loopback(host: str) -> bool:
 
 
 def seconds_of(header: str | None) -> float | None:
-    """The seconds of a Retry-After header; dates are not sent by windsplat."""
+    """The seconds of a Retry-After header, which proxies may give as a date."""
+    if header is None:
+        return None
     try:
-        return max(0.0, float(header)) if header is not None else None
+        return max(0.0, float(header))
+    except ValueError:
+        pass
+    try:
+        return max(0.0, email.utils.parsedate_to_datetime(header).timestamp() - time.time())
     except ValueError:
         return None
 
@@ -53,26 +84,52 @@ def _tls_of(verify: bool | str | ssl.SSLContext) -> ssl.SSLContext:
     return tls
 
 
+class _Body:
+    """A file as a body, whose length httpx asks of fileno()."""
+
+    def __init__(self, file: BinaryIO, progress: Callable[[int, int], object] | None) -> None:
+        self.fileno = file.fileno
+        self._file = file
+        self._progress = progress or (lambda sent, whole: None)
+
+    def __iter__(self) -> Iterator[bytes]:
+        sent, whole = 0, os.fstat(self.fileno()).st_size
+        self._progress(sent, whole)
+        while block := self._file.read(1 << 16):
+            yield block
+            sent += len(block)
+            self._progress(sent, whole)
+
+
 class Http:
     """Requests below one address. Safe to use from several threads."""
 
     def __init__(self, url: str, token: str | None, timeout: float, patience: float,
                  verify: bool | str | ssl.SSLContext = True) -> None:
-        self.base = base_of(url)
-        self.loopback = is_loopback(httpx.URL(self.base).host)
+        place = socket_of(url)
+        self.socket: str | None = None if place is None else place[0]
+        """Path of the UNIX socket that requests go through."""
+        self.base = base_of(url) if place is None else place[1]
+        self.loopback = place is not None or is_loopback(httpx.URL(self.base).host)
+        self.name = self.base if place is None else f"unix:{place[0]}"
         self.tls: ssl.SSLContext | None = None
         if self.base.startswith("https:"):
             self.tls = _tls_of(verify)
         self.token = token
         self.patience = patience
+        self.ended: Callable[[], str] = str
+        """Says how a server that was started here has ended; empty: it runs."""
         headers = {"User-Agent": "windsplat-python"}
         if token:
             headers["Authorization"] = f"Bearer {token}"
+        # Without https no certificates are read, which takes longer than most requests.
+        check: bool | ssl.SSLContext = False if self.tls is None else self.tls
         # Pictures are rendered before the first byte is sent, hence the long time to read.
         self._client = httpx.Client(
             headers=headers, timeout=httpx.Timeout(timeout, connect=min(timeout, 10.0)),
-            verify=True if self.tls is None else self.tls, trust_env=not self.loopback,
-        )
+            verify=check, trust_env=not self.loopback,
+            transport=None if self.socket is None else httpx.HTTPTransport(verify=check,
+                                                                           uds=self.socket))
 
     def close(self) -> None:
         self._client.close()
@@ -87,6 +144,7 @@ class Http:
         accept: str | None = None,
         file: pathlib.Path | None = None,
         headers: Mapping[str, str] | None = None,
+        progress: Callable[[int, int], object] | None = None,
     ) -> httpx.Response:
         """The answer to a request. `path` is relative to the base, or begins with a slash as in
         links of the server; `file` is sent as the body. A refusal (429, 503) is repeated after
@@ -100,15 +158,21 @@ class Http:
         end = time.monotonic() + self.patience
         while True:
             if self._client.is_closed:
-                raise ConnectionFailed(f"{self.base}: this server was closed by close(): start or "
+                raise ConnectionFailed(f"{self.name}: this server was closed by close(): start or "
                                        "connect to one again")
             try:
                 with contextlib.ExitStack() as stack:
-                    content = None if file is None else stack.enter_context(file.open("rb"))
+                    content = None
+                    if file is not None:
+                        content = _Body(stack.enter_context(file.open("rb")), progress)
                     answer = self._client.request(method, url, json=json, params=given or None,
                                                   headers=sent, content=content)
             except httpx.TransportError as error:
-                raise ConnectionFailed(f"{self.base}: {error or type(error).__name__}") from error
+                raise ConnectionFailed(self._reason(error)) from error
+            if 300 <= answer.status_code < 400:
+                raise ConnectionFailed(f"{self.name} sends requests on to "
+                                       f"{answer.headers.get('Location', 'nowhere')}: connect to "
+                                       "the address of the server itself")
             if answer.status_code < 400:
                 return answer
             problem = _problem(answer)
@@ -120,10 +184,23 @@ class Http:
                 raise problem
             time.sleep(wait)
 
+    def _reason(self, error: Exception) -> str:
+        """Why there was no answer, as a sentence."""
+        if ended := self.ended():
+            return f"{self.name}: {ended}"
+        if isinstance(error, httpx.ReadTimeout):
+            return f"{self.name}: no answer within {self._client.timeout.read:g} s (timeout=...)"
+        said = re.sub(r"^\[Errno -?\d+\] ", "", str(error)) or type(error).__name__
+        return f"{self.name}: {said}"
+
     def get(self, path: str, **params: Any) -> Any:
         """The JSON document of a GET request."""
         answer = self.request("GET", path, params=params)
-        return answer.json() if answer.content else None
+        try:
+            return answer.json() if answer.content else None
+        except ValueError:
+            raise ConnectionFailed(f"{answer.url} is no address of a windsplat server: the answer "
+                                   "is no JSON") from None
 
 
 def _problem(answer: httpx.Response) -> Problem:

@@ -7,6 +7,7 @@ import pathlib
 import queue
 import shutil
 import subprocess
+import sys
 import threading
 import time
 import weakref
@@ -62,16 +63,35 @@ def _read_lines(pipe: IO[str], sink: Any) -> None:
 GUARD = 'read -r line; kill "$1" 2>/dev/null'
 
 
+_inputs: weakref.WeakSet[IO[bytes]] = weakref.WeakSet()  # of guards
+
+
+def _close_inputs() -> None:
+    for pipe in list(_inputs):
+        pipe.close()
+
+
+if hasattr(os, "register_at_fork"):
+    # A fork, as a worker of multiprocessing, would keep the guard's input open.
+    os.register_at_fork(after_in_child=_close_inputs)
+
+
 def _guard_of(process: subprocess.Popen[str]) -> subprocess.Popen[bytes] | None:
     try:
-        return subprocess.Popen(
+        guard = subprocess.Popen(
             ["/bin/sh", "-c", GUARD, "windsplat-guard", str(process.pid)], stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     except OSError:  # a system without a shell: the server ends with close() and at exit
         return None
+    assert guard.stdin is not None
+    _inputs.add(guard.stdin)
+    return guard
 
 
-def _end(process: subprocess.Popen[str], guard: subprocess.Popen[bytes] | None) -> None:
+def _end(process: subprocess.Popen[str], guard: subprocess.Popen[bytes] | None,
+         owner: int) -> None:
+    if os.getpid() != owner:  # a fork of the process that started it, as of multiprocessing
+        return
     if guard is not None:  # first, so that it never signals a process of another number
         guard.kill()
         guard.wait()
@@ -92,7 +112,10 @@ class Process:
     def __init__(
         self, program: str, files: Sequence[str], options: Mapping[str, Any], timeout: float
     ) -> None:
-        command = [program, "serve", "--listen", "127.0.0.1:0", *arguments_of(options), *files]
+        if not sys.platform.startswith("linux"):
+            raise StartFailed("the program windsplat runs on Linux only: start it there, and use "
+                              "windsplat.connect(url)")
+        command = [program, "serve", *arguments_of({"listen": "127.0.0.1:0", **options}), *files]
         # A group of its own, so that an interrupt of the notebook's kernel does not end it.
         process = subprocess.Popen(
             command,
@@ -106,7 +129,8 @@ class Process:
         )
         self._process = process
         self._lines: collections.deque[str] = collections.deque(maxlen=LOG_LINES)
-        self._finalizer = weakref.finalize(self, _end, process, _guard_of(process))
+        self._finalizer = weakref.finalize(self, _end, process, _guard_of(process),
+                                           os.getpid())
         urls: queue.Queue[str | None] = queue.Queue()
         lines = self._lines
 
@@ -126,21 +150,35 @@ class Process:
         self, urls: queue.Queue[str | None], reader: threading.Thread, timeout: float
     ) -> str:
         end = time.monotonic() + timeout
-        while True:
-            try:
-                line = urls.get(timeout=max(0.0, end - time.monotonic()))
-            except queue.Empty:
-                self.close()
-                raise StartFailed(f"windsplat serve was not ready after {timeout:g} s") from None
-            if line is None:
-                reader.join(5)
-                code = self._process.wait()
-                # The message of the program says what its log says, too.
-                own = [one for one in self._lines if one.startswith("windsplat: ")]
-                said = "\n".join(own or self._lines) or "without a message"
-                raise StartFailed(f"windsplat serve ended with exit code {code}: {said}")
-            if line.startswith("http"):
-                return line.strip()
+        try:
+            while True:
+                try:
+                    line = urls.get(timeout=max(0.0, end - time.monotonic()))
+                except queue.Empty:
+                    raise StartFailed(f"windsplat serve was not ready after {timeout:g} s "
+                                      f"(start_timeout): {self._said()}") from None
+                if line is None:
+                    self._process.wait()
+                    reader.join(5)
+                    raise StartFailed(self.ended())
+                if line.startswith("http"):
+                    return line.strip()
+        except BaseException:  # an interrupt, too
+            self.close()
+            raise
+
+    def _said(self) -> str:
+        # The message of the program says what its log says, too.
+        own = [one for one in self._lines if one.startswith("windsplat: ")]
+        return "\n".join(own or list(self._lines)[-5:]) or "without a message"
+
+    def ended(self) -> str:
+        """How the program ended, with what it said last; empty: it runs."""
+        code = self._process.poll()
+        if code is None:
+            return ""
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        return f"windsplat serve ended with {how}: {self._said()}"
 
     @property
     def pid(self) -> int:

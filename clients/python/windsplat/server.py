@@ -10,13 +10,14 @@ import re
 import secrets
 import ssl
 import time
-from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Sequence
 
 from ._documents import suggestion
 from ._http import Http
 from ._process import Process, find_program, is_below
 from .dataset import Dataset
 from .errors import (
+    ConnectionFailed,
     JobTimeout,
     NotFound,
     WindsplatError,
@@ -81,6 +82,7 @@ class Server:
             process.close()
             raise
         server._process = process
+        server.http.ended = process.ended
         server._root = root
         return server
 
@@ -98,7 +100,16 @@ class Server:
 
     @property
     def url(self) -> str:
-        """The address, ending in a slash: that of the page, too."""
+        """The address, ending in a slash; of a UNIX socket unix: and its path."""
+        return self.http.base if self.http.socket is None else self.http.name
+
+    @property
+    def page(self) -> str:
+        """The address of the page in a browser. Raises ValueError for a UNIX socket, which no
+        browser opens."""
+        if self.http.socket is not None:
+            raise ValueError(f"a browser does not reach {self.url}: use view.live() in Jupyter, or "
+                             "connect to an address of http")
         return self.http.base
 
     @property
@@ -172,11 +183,13 @@ class Server:
                 body["title"] = title
         return self._opened(body, timeout)
 
-    def upload(self, path: str | os.PathLike[str], *, keep: float = 3600,
-               timeout: float = 300) -> Dataset:
+    def upload(self, path: str | os.PathLike[str], *, keep: float = 3600, timeout: float = 300,
+               progress: Callable[[int, int], object] | None = None) -> Dataset:
         """Sends a file to the server and opens it there; for servers that were started with
         --upload-limit and --state-dir. It is removed after `keep` seconds, or by
         dataset.close(forget=True).
+
+        progress: called as progress(bytes sent, all bytes), from 0.
 
         Raises Unauthorized if the server takes no uploads, and what open() raises.
         """
@@ -191,7 +204,7 @@ class Server:
         name = f"{stem}-{secrets.token_hex(8)}{suffix}"
         value = base64.b64encode(digest.digest()).decode()
         self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
-                          headers={"Content-Digest": f"sha-256=:{value}:"})
+                          progress=progress, headers={"Content-Digest": f"sha-256=:{value}:"})
         try:
             dataset = self._opened({"upload": name}, timeout)
         except BaseException:
@@ -248,11 +261,16 @@ class Server:
 
 def connect(url: str, token: str | None = None, *, timeout: float = 180, patience: float = 60,
             verify: bool | str | ssl.SSLContext = True) -> Server:
-    """Connects to a server. Raises ConnectionFailed or Unauthorized at once. The options are those
-    of Server."""
+    """Connects to a server. Raises ConnectionFailed or Unauthorized at once.
+
+    url: http://HOST:PORT/BASE/, https://..., or unix:/PATH of a socket, as `serve --listen` has it.
+    The other options are those of Server.
+    """
     server = Server(url, token, timeout=timeout, patience=patience, verify=verify)
     try:
-        server.http.get("v1")
+        about = server.http.get("v1")
+        if not isinstance(about, dict) or "version" not in about:
+            raise ConnectionFailed(f"{server.url} is no windsplat server: v1 names no version")
     except BaseException:
         server.close()
         raise

@@ -148,16 +148,22 @@ class Stream:
             text = base64.urlsafe_b64encode(http.token.encode()).decode().rstrip("=")
             protocols.append("bearer." + text)
         url = "ws" + http.base.removeprefix("http") + "v1/stream"
+        options = {"subprotocols": protocols, "max_size": None, **_options(http)}
         try:
-            self._socket = await websockets.connect(  # type: ignore[attr-defined]
-                url, subprotocols=protocols, max_size=None, **_options(http))
+            if http.socket is None:
+                self._socket = await websockets.connect(  # type: ignore[attr-defined]
+                    url, **options)
+            else:
+                self._socket = await websockets.unix_connect(  # type: ignore[attr-defined]
+                    http.socket, url, **options)
             self.hello = json.loads(await self._socket.recv())
         except (OSError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as error:
             answer = getattr(error, "response", None)
             status = getattr(error, "status_code", getattr(answer, "status_code", None))
             if status in (401, 403):
-                raise Unauthorized(status, "Unauthorized", f"{url} refuses the stream") from error
-            raise ConnectionFailed(f"{url}: {error}") from error
+                raise Unauthorized(status, "Unauthorized",
+                                   f"{http.name} refuses the stream") from error
+            raise ConnectionFailed(f"{http.name}: {http.ended() or error}") from error
         self._rev += 1
         await self._send({"type": "patch", "rev": self._rev, "patch": self._accepted})
         return self
@@ -243,7 +249,8 @@ class Stream:
             except websockets.exceptions.ConnectionClosed as error:
                 if self._closed:
                     raise StopAsyncIteration from None
-                raise ConnectionFailed(f"the stream was closed: {error}") from error
+                ended = self._server.http.ended()
+                raise ConnectionFailed(f"the stream was closed: {ended or error}") from error
             if isinstance(message, str):
                 self._take(json.loads(message))
                 continue

@@ -268,8 +268,9 @@ class View(ViewParts):
         who has the address may see and change the stored view; without --state-dir it is kept
         until the server ends."""
         server = self.dataset.server
+        page = server.page
         saved = server.http.request("POST", "v1/views", json=self._document).json()
-        return f"{server.url}#!view={saved['id']}"
+        return f"{page}#!view={saved['id']}"
 
     def movie(
         self, path: str | os.PathLike[str], steps: Iterable[int] | None = None, fps: float = 12,
@@ -288,7 +289,7 @@ class View(ViewParts):
     @property
     def url(self) -> str:
         """The address of the page with this view."""
-        return f"{self.dataset.server.url}#!{urllib.parse.quote(self.to_json(None))}"
+        return f"{self.dataset.server.page}#!{urllib.parse.quote(self.to_json(None))}"
 
     def widget(self, width: int | str = "100%", height: int = 450) -> IFrame:
         """A live view for Jupyter: the page without its panels, in a frame. The address has to
@@ -297,7 +298,7 @@ class View(ViewParts):
         from .jupyter import IFrame
 
         hash = urllib.parse.quote(self.to_json(None))
-        return IFrame(f"{self.dataset.server.url}?embed#!{hash}", width, height)
+        return IFrame(f"{self.dataset.server.page}?embed#!{hash}", width, height)
 
     def live(self, height: int = 450) -> Any:
         """A live view as a widget of Jupyter, windsplat.widget.LiveView: frames pass through the

@@ -57,7 +57,7 @@ class Prepared:
                 outer.bodies.append(self.rfile.read(int(self.headers.get("Content-Length", 0))))
                 outer.headers.append(dict(self.headers))
                 status, headers, document = left.pop(0) if len(left) > 1 else left[0]
-                body = json.dumps(document).encode()
+                body = document if isinstance(document, bytes) else json.dumps(document).encode()
                 self.send_response(status)
                 for name, value in {**headers, "Content-Length": len(body)}.items():
                     self.send_header(name, str(value))
@@ -71,7 +71,7 @@ class Prepared:
 
         self._server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self.url = f"http://127.0.0.1:{self._server.server_port}/"
-        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+        threading.Thread(target=self._server.serve_forever, args=(0.01,), daemon=True).start()
 
     def __enter__(self):
         return self

@@ -2,12 +2,12 @@
 import asyncio
 import base64
 import datetime
+import email.utils
 import hashlib
 import json
 import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -15,89 +15,13 @@ import unittest
 import unittest.mock
 
 import numpy as np
-from support import CLIENT, PROGRAM, Prepared, shared_server, start, windsplat
+from support import Prepared, shared_server, start, windsplat
 
-from windsplat._times import step_of
+from windsplat._times import SAME, step_of
 
 
 def problem(status, **more):
     return {"type": "about:blank", "title": "Refused", "status": status, "detail": "no", **more}
-
-
-class Start(unittest.TestCase):
-    def test_a_server_ends_with_its_block(self):
-        with start("tornado:16") as server:
-            self.assertEqual(list(server.datasets), ["tornado:16"])
-            self.assertRegex(server.version, r"^\d+\.\d+\.\d+")
-            url, view = server.url, server["tornado:16"].view(size=(16, 16))
-            view.frame()
-        with self.assertRaisesRegex(windsplat.ConnectionFailed, f"{url}.*closed by close"):
-            view.frame()
-        with self.assertRaises(windsplat.ConnectionFailed):
-            windsplat.connect(url)
-
-    def test_a_server_ends_with_a_process_that_is_killed(self):
-        code = ("import sys, time, windsplat\n"
-                "server = windsplat.Server.start('tornado:8', threads=1)\n"
-                "print(server._process.pid, flush=True)\n"
-                "time.sleep(600)\n")
-        with subprocess.Popen([sys.executable, "-W", "ignore", "-c", code], cwd=CLIENT,
-                              stdout=subprocess.PIPE, text=True) as process:
-            server = int(process.stdout.readline())
-            os.kill(server, 0)
-            process.kill()
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            try:
-                state = pathlib.Path(f"/proc/{server}/stat").read_text().rpartition(")")[2]
-            except (FileNotFoundError, ProcessLookupError):
-                return
-            if state.split()[0] == "Z":  # it waits to be collected by the process that adopted it
-                return
-            time.sleep(0.05)
-        self.fail("the server goes on without the process that started it")
-
-    def test_notebooks_of_this_machine_may_show_the_embedded_view(self):
-        server, _ = shared_server()
-        policy = server.http.request("GET", "?embed", accept="text/html").headers[
-            "Content-Security-Policy"]
-        self.assertIn("http://localhost:8888", policy)
-
-    def test_a_program_that_is_not_there_is_named(self):
-        with self.assertRaisesRegex(windsplat.StartFailed, "argument program.*'/nowhere/w'"):
-            windsplat.Server.start(program="/nowhere/w")
-        with unittest.mock.patch.dict(os.environ, {"PATH": "/nowhere"}):
-            os.environ.pop("WINDSPLAT", None)
-            with self.assertRaisesRegex(windsplat.StartFailed, "PATH.*WINDSPLAT.*connect"):
-                windsplat.Server.start()
-        with unittest.mock.patch.dict(os.environ, {"WINDSPLAT": "/nowhere/x"}):
-            with self.assertRaisesRegex(windsplat.StartFailed, r"\$WINDSPLAT: '/nowhere/x'"):
-                windsplat.Server.start()
-
-    def test_what_the_program_says_is_in_the_error(self):
-        with self.assertRaisesRegex(windsplat.StartFailed, "exit code 2.*--max-pixels.*'many'"):
-            start("tornado:16", max_pixels="many")
-        with self.assertRaises(windsplat.StartFailed) as caught:
-            start("nowhere.nc", strict=True)
-        self.assertEqual(str(caught.exception).count("'nowhere.nc': no such file"), 1)
-
-    def test_one_dataset_is_opened_by_open(self):
-        with unittest.mock.patch.dict(os.environ, {"WINDSPLAT": PROGRAM}):
-            dataset = windsplat.open("tornado:16", threads=1)
-        with dataset.server:
-            self.assertEqual(dataset.shape, (16, 16, 16))
-
-    def test_a_wrong_token_is_refused_and_a_right_one_accepted(self):
-        with tempfile.NamedTemporaryFile("w") as file:
-            file.write("0123456789abcdefX\n")
-            file.flush()
-            with start("tornado:16", token_file=file.name) as server:
-                self.assertEqual(list(server.datasets), ["tornado:16"])
-                with self.assertRaises(windsplat.Unauthorized) as caught:
-                    windsplat.connect(server.url)
-                self.assertEqual(caught.exception.status, 401)
-                with windsplat.connect(server.url, token="0123456789abcdefX") as there:
-                    self.assertEqual(list(there.datasets), ["tornado:16"])
 
 
 class Refusals(unittest.TestCase):
@@ -110,6 +34,27 @@ class Refusals(unittest.TestCase):
             self.assertEqual(there.requests, ["GET /v1"] * 3)
         # Up to a fifth longer, so that clients refused together come apart; without a word 1 s.
         self.assertTrue(7 <= waits[0] <= 8.4 and 1 <= waits[1] <= 1.2, waits)
+
+    def test_a_date_says_when_to_ask_again_too(self):
+        waits = []
+        date = email.utils.formatdate(time.time() + 30, usegmt=True)
+        with Prepared((503, {"Retry-After": date}, problem(503)),
+                      (200, {}, {"version": "1.2.3"})) as there:
+            with unittest.mock.patch("time.sleep", waits.append):
+                windsplat.connect(there.url)
+        self.assertTrue(20 < waits[0] <= 36, waits)
+
+    def test_what_is_no_windsplat_server_is_refused_as_that(self):
+        for answer, text in (((200, {}, ["a"]), "no windsplat server"),
+                             ((200, {}, {"a": 1}), "no windsplat server"),
+                             ((200, {}, "<html>"), "no windsplat server"),
+                             ((302, {"Location": "/login"}, {}), "sends requests on to /login")):
+            with self.subTest(answer), Prepared(answer) as there:
+                with self.assertRaisesRegex(windsplat.ConnectionFailed, text):
+                    windsplat.connect(there.url)
+        with Prepared((200, {}, b"<html>")) as there:
+            with self.assertRaisesRegex(windsplat.ConnectionFailed, "/v1 is no address of"):
+                windsplat.connect(there.url)
 
     def test_a_wait_beyond_the_patience_is_not_begun(self):
         with Prepared((429, {"Retry-After": "30"}, problem(429))) as there:
@@ -139,8 +84,9 @@ class Refusals(unittest.TestCase):
     def test_addresses(self):
         self.assertEqual(windsplat.Server("localhost:8080").url, "http://localhost:8080/")
         self.assertEqual(windsplat.Server("https://a.example/b/?c#d").url, "https://a.example/b/")
-        with self.assertRaises(ValueError):
-            windsplat.Server("ftp://a.example")
+        for address in ("ftp://a.example", "http://a b", "", "unix:relative", "unix:"):
+            with self.assertRaisesRegex(ValueError, f"'.*{address}' is no"):
+                windsplat.Server(address)
 
 
 class Values(unittest.TestCase):
@@ -213,14 +159,12 @@ class Values(unittest.TestCase):
             self.server["tornado:24"].probe(lon=1, lat=1, level=1)
 
     def test_steps_without_dates_are_chosen_by_their_coordinates(self):
-        times = np.array([0.0, 0.1, 0.3])
+        times = [0.0, 0.1, 0.3]
         texts = ["0 s", "0.1 s", "0.3 s"]
-        self.assertEqual(step_of(times, 0.1 + 1e-12, False, texts), 1)
-        self.assertEqual(step_of(times, 0.19, True, texts), 1)
+        self.assertEqual(step_of(times, 0.1 + 1e-12, False, texts, 0.1, SAME), 1)
+        self.assertEqual(step_of(times, 0.19, True, texts, 0.19, SAME), 1)
         with self.assertRaisesRegex(windsplat.InvalidView, r"0\.1 s \(step 1\).*0\.3 s \(step 2"):
-            step_of(times, 0.2, False, texts)
-        with self.assertRaisesRegex(ValueError, "no dates, give a number from 0 to 0.3"):
-            step_of(times, "2001-01-01", False, texts)
+            step_of(times, 0.2, False, texts, 0.2, SAME)
 
     def test_probes_series_histograms_and_ranges_agree(self):
         probe = self.dataset.probe(10, 40, 500, step=2, fields=["wind_speed"])
@@ -335,7 +279,9 @@ class Uploads(unittest.TestCase):
         done = {"id": "1", "kind": "dataset", "state": "done", "result": "winds", "problem": None}
         refused = (429, {"Retry-After": "0"}, problem(429))
         with Prepared(refused, (201, {}, {}), (202, {}, done)) as there:
-            dataset = windsplat.Server(there.url).upload(self.path, keep=60)
+            sent = []
+            dataset = windsplat.Server(there.url).upload(
+                self.path, keep=60, progress=lambda *counts: sent.append(counts))
             self.assertEqual(dataset.id, "winds")
             again, put, post = there.requests
             self.assertEqual(again, put)
@@ -344,6 +290,7 @@ class Uploads(unittest.TestCase):
             self.assertEqual(there.bodies[1], self.path.read_bytes())
             digest = base64.b64encode(hashlib.sha256(there.bodies[1]).digest()).decode()
             self.assertEqual(there.headers[1]["Content-Digest"], f"sha-256=:{digest}:")
+            self.assertEqual((sent[0], sent[-1]), ((0, 10_000), (10_000, 10_000)))
             self.assertEqual(json.loads(there.bodies[2]),
                              {"upload": put.split("/")[3].split("?")[0]})
             dataset.close(forget=True)
