@@ -10,18 +10,19 @@ import itertools
 import pathlib
 import re
 import tempfile
-from typing import Any, Iterable, Mapping, Sequence
+from typing import Any, Callable, Iterable, Mapping, Sequence
 
 import xarray
 
 from ._documents import suggestion
+from ._netcdf import file_name_of, write
 from .dataset import Dataset
 from .server import Server
 from .view import View
 
 TIME_NAMES = ("time", "t", "valid_time", "step", "forecast_reference_time")
-# Of the encoding of a variable; the rest, such as sizes of chunks, belongs to its file.
-KEPT_ENCODING = ("units", "calendar", "_FillValue", "missing_value", "grid_mapping", "coordinates")
+
+KINDS = "fiub"  # of numbers that fields have
 
 _numbers = itertools.count(1)
 _local: list[Server] = []
@@ -42,17 +43,18 @@ def local_server(**options: Any) -> Server:
     return _local[0]
 
 
-def _is_time(dataset: xarray.Dataset, dimension: str) -> bool:
-    if dimension.lower() in TIME_NAMES:
+def _is_time(dataset: xarray.Dataset, dimension: Any) -> bool:
+    if str(dimension).lower() in TIME_NAMES:
         return True
     coordinate = dataset.coords.get(dimension)
     return coordinate is not None and (
-        coordinate.dtype.kind in "mM" or coordinate.attrs.get("axis") == "T")
+        coordinate.dtype.kind in "mM" or coordinate.attrs.get("axis") == "T"
+        or (coordinate.dtype.kind == "O" and hasattr(coordinate.values[0], "calendar")))
 
 
-def space_dimensions(dataset: xarray.Dataset, name: str) -> list[str]:
+def space_dimensions(dataset: xarray.Dataset, name: Any) -> list[str]:
     """The dimensions of a variable besides time."""
-    return [str(one) for one in dataset[name].dims if not _is_time(dataset, str(one))]
+    return [str(one) for one in dataset[name].dims if not _is_time(dataset, one)]
 
 
 def _related(dataset: xarray.Dataset, names: Iterable[str]) -> list[str]:
@@ -75,15 +77,16 @@ class Accessor:
         self._dataset = dataset
         self._opened: dict[Any, Dataset] = {}
 
-    def fields(self) -> list[str]:
+    def fields(self) -> list[Any]:
         """Names of the variables with three dimensions in space."""
-        return [str(one) for one in self._dataset.data_vars
-                if len(space_dimensions(self._dataset, str(one))) >= 3
-                and self._dataset[one].dtype.kind in "fiu"]
+        return [one for one in self._dataset.data_vars
+                if len(space_dimensions(self._dataset, one)) >= 3
+                and self._dataset[one].dtype.kind in KINDS]
 
     def open(
-        self, names: Sequence[str] | None = None, *, server: Server | None = None,
-        rename: Mapping[str, str] | None = None, title: str | None = None,
+        self, names: Sequence[Any] | None = None, *, server: Server | None = None,
+        rename: Mapping[Any, str] | None = None, title: str | None = None,
+        progress: Callable[[int, int], object] | None = None,
     ) -> Dataset:
         """Hands variables over to a server and returns the dataset there. It is done once for each
         choice of variables: see refresh().
@@ -91,11 +94,14 @@ class Accessor:
         names: variables; by default all with three dimensions in space.
         server: by default one that the first call starts on this machine. One of Server.start
             with a `data_root` reads the file there; others get an upload, if they take any.
-        rename: names in the file.
+        rename: names in the file. Without one a name keeps its letters and digits, and other
+            characters become "_".
         title: of the pictures; by default the attribute `title` of the Dataset, without one the
             long name or name of a variable that is handed over alone, otherwise "xarray".
+        progress: of an upload: progress(bytes sent, all bytes).
 
-        Raises ValueError if a variable is not there or has no three dimensions in space.
+        Raises ValueError if a variable is not there, has no three dimensions in space, values
+        beyond those of float32 or no room in the folder.
         """
         chosen = self.fields() if names is None else list(dict.fromkeys(names))
         self._check(chosen)
@@ -103,12 +109,12 @@ class Accessor:
         key = (there.url, tuple(chosen), tuple((rename or {}).items()), title)
         if key not in self._opened:
             if there._root is not None:
-                path = self._write(chosen, there._root, rename or {}, title)
+                path = self._write(chosen, there._root, rename, title)
                 self._opened[key] = there.open(path)
             else:
                 with tempfile.TemporaryDirectory(prefix="windsplat-") as folder:
-                    path = self._write(chosen, pathlib.Path(folder), rename or {}, title)
-                    self._opened[key] = there.upload(path)
+                    path = self._write(chosen, pathlib.Path(folder), rename, title)
+                    self._opened[key] = there.upload(path, progress=progress)
         return self._opened[key]
 
     def refresh(self) -> None:
@@ -121,8 +127,7 @@ class Accessor:
         self._opened.clear()
 
     def view(
-        self, u: str | None = None, v: str | None = None, w: str | None = None,
-        scalar: str | Sequence[str] | None = None, *, server: Server | None = None,
+        self, u: Any = None, v: Any = None, w: Any = None, scalar: Any = None, *, server: Server | None = None,
         title: str | None = None, size: tuple[int, int] | None = None, step: int | None = None,
         **keys: Any,
     ) -> View:
@@ -137,68 +142,74 @@ class Accessor:
         components = [one for one in (u, v, w) if one is not None]
         if components and (u is None or v is None):
             raise ValueError("lines need the components u and v")
-        scalars = [scalar] if isinstance(scalar, str) else list(scalar or [])
+        many = isinstance(scalar, Iterable) and not isinstance(scalar, str)
+        scalars: list[Any] = [] if scalar is None else list(scalar) if many else [scalar]
         if not components and not scalars:
             return self.open(server=server, title=title).view(size=size, step=step, **keys)
-        names = [*components, *scalars]
+        names = list(dict.fromkeys([*components, *scalars]))
         dataset = self.open(names, server=server, title=title)
-        field = _vector_of(dataset, components) if components else None
+        new = _names_in_file(names, None)
+        field = _vector_of(dataset, [new[one] for one in components]) if components else None
         if components and field is None:
             # The server knows vectors by the usual names of their components.
             usual = {one: name for one, name in zip((u, v, w), "uvw") if one is not None}
             dataset = self.open(names, server=server, rename=usual, title=title)
+            new = _names_in_file(names, usual)
             field = _vector_of(dataset, [usual[one] for one in components])
             if field is None:
-                raise ValueError(f"{', '.join(components)} form no vector: "
+                raise ValueError(f"{', '.join(map(str, components))} form no vector: "
                                  + "; ".join(map(str, dataset.description["notes"])))
         for one in scalars:
-            if one not in dataset.fields:
+            if new[one] not in dataset.fields:
                 raise ValueError(f"'{one}' is not on the grid of the others: "
                                  + "; ".join(map(str, dataset.description["notes"])))
-        return dataset.view(size=size, step=step).vector(field=field).scalars(*scalars).patch(keys)
+        media = [new[one] for one in scalars]
+        return dataset.view(size=size, step=step).vector(field=field).scalars(*media).patch(keys)
 
-    def _check(self, names: Sequence[str]) -> None:
+    def _check(self, names: Sequence[Any]) -> None:
         variables = [str(one) for one in self._dataset.data_vars]
         if not names:
-            shapes = "; ".join(f"{one} ({', '.join(map(str, self._dataset[one].dims))})"
-                               for one in variables)
-            raise ValueError("no variable has three dimensions in space besides time: "
+            shapes = "; ".join(f"{one} ({', '.join(map(str, self._dataset[one].dims))}) "
+                               f"{self._dataset[one].dtype}" for one in self._dataset.data_vars)
+            raise ValueError("no variable of numbers has three dimensions in space besides time: "
                              + (shapes or "the dataset has no variables"))
         for name in names:
             if name not in self._dataset.variables:
-                raise ValueError(f"there is no variable '{name}': {suggestion(name, variables)}")
+                raise ValueError(f"there is no variable '{name}': "
+                                 + suggestion(str(name), variables))
             space = space_dimensions(self._dataset, name)
             if len(space) < 3:
                 raise ValueError(f"'{name}' has the dimensions ({', '.join(space)}) in space; "
                                  "windsplat draws fields of three")
+            if self._dataset[name].dtype.kind not in KINDS:
+                raise ValueError(f"'{name}' has values of type {self._dataset[name].dtype}; "
+                                 "windsplat draws real numbers")
+            if 0 in self._dataset[name].shape:
+                raise ValueError(f"'{name}' has no values: its shape is "
+                                 f"{dict(self._dataset[name].sizes)}")
 
-    def _write(self, names: Sequence[str], folder: pathlib.Path,
-               rename: Mapping[str, str], title: str | None) -> pathlib.Path:
-        part = self._dataset[[*names, *_related(self._dataset, names)]].copy(deep=False)
-        for name in part.variables:
-            variable = part[name]
-            kept = {key: value for key, value in variable.encoding.items()
-                    if key in KEPT_ENCODING and key not in variable.attrs}
-            if name in names and variable.dtype == "float64":
-                kept["dtype"] = "float32"  # as the server keeps it
-            part[name].encoding = kept
-        if rename:
-            taken = {new: f"{new}_" for old, new in rename.items()
-                     if new in part.variables and new != old and new not in rename}
-            part = part.rename({**taken, **rename})
-        if title is not None:
-            part.attrs["title"] = title
-        elif not part.attrs.get("title"):
+    def _write(self, names: Sequence[Any], folder: pathlib.Path,
+               rename: Mapping[Any, str] | None, title: str | None) -> pathlib.Path:
+        if title is None and not (title := self._dataset.attrs.get("title")):
             # The server would take the name of the file.
             alone = self._dataset[names[0]].attrs.get("long_name", names[0])
-            part.attrs["title"] = str(alone) if len(names) == 1 else "xarray"
+            title = str(alone) if len(names) == 1 else "xarray"
+        others = [one for one in _related(self._dataset, names) if one not in names]
         path = _new_file(folder)
         try:
-            part.to_netcdf(path)
+            write(path, self._dataset, _names_in_file(names, rename), others, str(title))
         except BaseException:
             path.unlink()
             raise
         return path
+
+
+def _names_in_file(names: Sequence[Any], rename: Mapping[Any, str] | None) -> dict[Any, str]:
+    out = dict(rename or {})
+    for name in names:
+        if name not in out:
+            out[name] = file_name_of(name, list(out.values()))
+    return out
 
 
 def _new_file(folder: pathlib.Path) -> pathlib.Path:
@@ -224,8 +235,8 @@ class ArrayAccessor:
     """`array.windsplat`: pictures of one DataArray."""
 
     def __init__(self, array: xarray.DataArray) -> None:
-        name = str(array.name or "field")
-        self._name = name
+        name = "field" if array.name is None else array.name
+        self._name: Any = name
         self._accessor = Accessor(array.to_dataset(name=name))
 
     def view(self, *, server: Server | None = None, title: str | None = None,

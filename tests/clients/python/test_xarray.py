@@ -1,6 +1,7 @@
 """The accessor of xarray: what the server reads is what the arrays hold."""
 import tempfile
 import unittest
+import unittest.mock
 
 import numpy as np
 import support
@@ -39,6 +40,43 @@ def example():
             "longitude": ("longitude", LONGITUDES, {"units": "degrees_east"}),
         },
     )
+
+
+def cube(dtype="f4", name="a", **attributes):
+    """A Dataset of one field over two times, with plain coordinates."""
+    values = (np.arange(2 * 3 * 4 * 5) % 100).reshape(2, 3, 4, 5).astype(dtype)
+    return xarray.Dataset(
+        {name: (("time", "z", "y", "x"), values, attributes)},
+        {"time": np.array(["2020-01-01", "2020-01-02"], dtype="datetime64[ns]"),
+         "z": np.arange(3.0), "y": np.arange(4.0), "x": np.arange(5.0)})
+
+
+class Lazy:
+    """An array that is computed where it is read, and notes how much of it at once."""
+
+    def __init__(self, array):
+        self.array, self.shape, self.dtype, self.most = array, array.shape, array.dtype, 0
+        self.ndim, self.size = array.ndim, array.size
+
+    def __getitem__(self, key):
+        part = self.array[key]
+        self.most = max(self.most, part.size)
+        return part
+
+
+def lazy(arrays, name):
+    """The Dataset with a lazy variable, as xarray.open_dataset gives it."""
+    source = Lazy(arrays[name].values)
+
+    class Backend(xarray.backends.BackendArray):
+        shape, dtype = source.shape, source.dtype
+
+        def __getitem__(self, key):
+            return xarray.core.indexing.explicit_indexing_adapter(
+                key, self.shape, xarray.core.indexing.IndexingSupport.BASIC, source.__getitem__)
+
+    variable = xarray.Variable(arrays[name].dims, xarray.core.indexing.LazilyIndexedArray(Backend()))
+    return arrays.assign({name: variable}), source
 
 
 class Accessors(unittest.TestCase):
@@ -139,6 +177,83 @@ class Accessors(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, r"no variable.*t2m \(time, latitude, longitude\)"):
             self.view()
 
+    def values(self, arrays, name="a", step=1, **more):
+        dataset = arrays.windsplat.open(server=self.server, **more)
+        return dataset.values(name, step=step).array
+
+    def test_numbers_of_every_kind_arrive(self):
+        for dtype in ("f2", "f4", "f8", "g", ">f4", "i1", "i2", "u2", "i8", "u8", "?"):
+            with self.subTest(dtype):
+                arrays = cube(dtype)
+                np.testing.assert_array_equal(self.values(arrays),
+                                              arrays.a[1].values.astype("f4"))
+
+    def test_packed_and_missing_values_are_those_of_the_attributes(self):
+        packed = cube("i2", scale_factor=0.5, add_offset=10.0, _FillValue=np.int16(3))
+        wanted = np.where(packed.a[1] == 3, np.nan, packed.a[1] * 0.5 + 10).astype("f4")
+        np.testing.assert_array_equal(self.values(packed), wanted)
+        marked = cube("f8", _FillValue=1e300, missing_value=7.0)  # as read without decoding
+        marked.a[:] = marked.a.where(marked.a != 8, 1e300)
+        wanted = marked.a[1].where((marked.a[1] != 7) & (marked.a[1] != 1e300)).values.astype("f4")
+        np.testing.assert_array_equal(self.values(marked), wanted)
+        unpacked = cube("f4", valid_range=np.array([0, 20], "i2"))  # of the packed values
+        unpacked.a.encoding.update(dtype="int16", scale_factor=0.01, _FillValue=-1)
+        np.testing.assert_array_equal(self.values(unpacked), unpacked.a[1].values)
+
+    def test_fields_without_any_value_have_no_range(self):
+        dataset = (cube() * np.nan).windsplat.open(server=self.server)
+        self.assertTrue(np.isnan(dataset.range("a")).all())
+
+    def test_names_and_attributes_that_netcdf_lacks_are_replaced_and_left_out(self):
+        arrays = cube(name="temp (K)/x", units="K", source=None, parts={"a": 1}, checked=True)
+        arrays.attrs["history"] = None
+        view = arrays.windsplat.view(scalar="temp (K)/x", server=self.server)
+        self.assertEqual(view.get("/scalars"), [{"field": "temp_K_x"}])
+        self.assertEqual(view.dataset.fields["temp_K_x"].units, "K")
+        view = xarray.Dataset({3: cube().a}).windsplat.view(scalar=3, server=self.server)
+        self.assertEqual(view.get("/scalars"), [{"field": "v3"}])
+        same = xarray.DataArray(np.zeros((3, 3, 3)), dims=("x", "y", "z"), name="x")
+        self.assertEqual(list(same.windsplat.view(server=self.server).dataset.fields), ["x"])
+
+    def test_places_of_columns_come_along(self):
+        arrays = cube(standard_name="air_temperature").drop_vars(("x", "y"))
+        lat, lon = np.meshgrid(np.linspace(40, 43, 4), np.linspace(5, 9, 5), indexing="ij")
+        arrays = arrays.assign_coords(
+            lat=(("y", "x"), lat + 0.01 * lon, {"units": "degrees_north"}),
+            lon=(("y", "x"), lon - 0.01 * lat, {"units": "degrees_east"}))
+        probe = arrays.windsplat.open(server=self.server).probe(lon=8, lat=42, level=1)
+        self.assertEqual(probe.position.index[:2], (3, 2))
+
+    def test_lazy_arrays_are_read_an_entry_at_a_time_and_not_kept(self):
+        arrays, source = lazy(cube("f8"), "a")
+        np.testing.assert_array_equal(self.values(arrays), cube().a[1].values)
+        self.assertEqual(source.most, 3 * 4 * 5)
+        source.array = source.array + 1
+        self.assertEqual(float(arrays.a[0, 0, 0, 1]), 2)
+
+    def test_arrays_of_dask_are_computed(self):
+        try:
+            import dask.array  # noqa: F401
+        except ImportError:
+            self.skipTest("dask is not installed")
+        arrays = cube().chunk({"time": 1, "x": 2})
+        np.testing.assert_array_equal(self.values(arrays), cube().a[1].values)
+
+    def test_what_cannot_be_held_is_named(self):
+        refused = (
+            (cube("f8") * 1e300, "'a' has values up to 5.9e.301; the server keeps float32, at most"),
+            (cube().isel(x=slice(0)), "'a' has no values: its shape is .*'x': 0"),
+            (cube("c8"), "no variable of numbers.*complex64"))
+        for arrays, text in refused:
+            with self.subTest(text), self.assertRaisesRegex(ValueError, text):
+                arrays.windsplat.open(server=self.server)
+        with self.assertRaisesRegex(ValueError, "'a' has values of type complex64"):
+            cube("c8").windsplat.open(["a"], server=self.server)
+        room = unittest.mock.Mock(free=100)
+        with unittest.mock.patch("shutil.disk_usage", return_value=room):
+            with self.assertRaisesRegex(ValueError, "of which 'a' .* MB; the folder .* 0 MB left"):
+                cube().windsplat.open(server=self.server)
+
     def test_another_server_gets_an_upload(self):
         if not support.takes_uploads():
             self.skipTest("the daemon has no option --upload-limit")
@@ -152,7 +267,11 @@ class Accessors(unittest.TestCase):
                 self.assertRegex(view.dataset.upload_id, r"^xarray-\d+-[0-9a-f]{16}\.nc$")
                 self.arrays = example()
                 arrays = self.arrays.windsplat
-                dataset = arrays.open(["cc"], server=remote)
+                sent = []
+                dataset = arrays.open(["cc"], server=remote,
+                                      progress=lambda *counts: sent.append(counts))
+                self.assertEqual(sent[-1][0], sent[-1][1])
+                self.assertGreater(sent[-1][1], 1000)
                 arrays.refresh()
                 self.assertNotIn(dataset.id, remote.datasets)
 
