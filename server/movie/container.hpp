@@ -6,13 +6,11 @@
 #include <string>
 #include <string_view>
 
+#include "protocol/animation/animation.hpp"
+
 namespace windsplat::movie {
 
-enum class Container {
-  mp4,   // H.264, 4:2:0, the index first, so that it plays while it is downloaded
-  webm,  // VP9, 4:2:0
-  zip,   // a PNG for each picture, frame_000000.png and so on: exact, and needs no other program
-};
+using Container = protocol::AnimationFormat;
 inline constexpr std::array containers{Container::mp4, Container::webm, Container::zip};
 
 std::string_view name_of(Container container);        // "mp4"

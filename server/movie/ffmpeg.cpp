@@ -129,6 +129,15 @@ Result<std::string> choose_encoder(const Ffmpeg& ffmpeg, Container container) {
                                             ": use one that has it, or choose a .zip");
 }
 
+Result<void> check_encoder(Container container) {
+  if (!needs_ffmpeg(container)) return {};
+  const auto ffmpeg = find_ffmpeg();
+  if (!ffmpeg) return ffmpeg.error();
+  const auto encoder = choose_encoder(*ffmpeg, container);
+  if (!encoder) return encoder.error();
+  return {};
+}
+
 std::vector<std::string> arguments_of(const Options& options, const std::string& encoder, int width,
                                       int height) {
   const std::string size = std::to_string(width) + 'x' + std::to_string(height);

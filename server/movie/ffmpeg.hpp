@@ -28,6 +28,10 @@ std::vector<std::string> encoders_of(Container container);
 // The encoder to use. Errors: invalid if the program has none for the container.
 Result<std::string> choose_encoder(const Ffmpeg& ffmpeg, Container container);
 
+// Whether a movie can be encoded; a ZIP always can. Errors: those of find_ffmpeg() and
+// choose_encoder().
+Result<void> check_encoder(Container container);
+
 // Arguments that read raw pictures (rgb24) from standard input, `width` x `height` pixels, both
 // even, and write the container to descriptor 3. RGB becomes Y'CbCr by ITU-R BT.709, limited range,
 // and the file says so; the transfer function is that of sRGB (IEC 61966-2-1), as of the pictures.

@@ -33,8 +33,8 @@ int write_all(int file, std::span<const std::uint8_t> bytes) {
   return 0;
 }
 
-// A file without a name in the folder for temporary files. Returns a failed descriptor with errno
-// set if there can be none.
+}  // namespace
+
 data::Descriptor unnamed_file() {
   std::error_code fault;
   const fs::path folder = fs::temp_directory_path(fault);
@@ -47,8 +47,6 @@ data::Descriptor unnamed_file() {
   if (file) ::unlink(name.c_str());
   return file;
 }
-
-}  // namespace
 
 Error Output::failed(const char* what, int fault) const {
   const std::string name = path_.empty() ? std::string("the output") : in_quotes(path_.native());
@@ -87,19 +85,26 @@ Result<Output> Output::to(int descriptor) {
   return out;
 }
 
+Result<Output> Output::in_place(int file) {
+  auto out = to(file);
+  if (out) out->in_place_ = true;
+  return out;
+}
+
 Output::Output(Output&& other) noexcept
     : path_(std::move(other.path_)),
       target_(std::move(other.target_)),
       part_(std::exchange(other.part_, fs::path())),
       file_(std::move(other.file_)),
-      unnamed_(std::move(other.unnamed_)) {}
+      unnamed_(std::move(other.unnamed_)),
+      in_place_(other.in_place_) {}
 
 Output::~Output() {
   if (!part_.empty()) ::unlink(part_.c_str());
 }
 
 Result<int> Output::file_for_program() {
-  if (!part_.empty()) return file_.number();
+  if (!part_.empty() || in_place_) return file_.number();
   unnamed_ = unnamed_file();
   if (!unnamed_) return failed("there is no room for temporary files to write", errno);
   return unnamed_.number();

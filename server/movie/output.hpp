@@ -11,6 +11,10 @@
 
 namespace windsplat::movie {
 
+// A file without a name in the folder for temporary files, open for reading and writing. A failed
+// descriptor with errno set if there can be none.
+data::Descriptor unnamed_file();
+
 class Output {
  public:
   // A file beside `path` with a temporary name. Devices, pipes and descriptors of this process
@@ -18,6 +22,8 @@ class Output {
   static Result<Output> at(const std::filesystem::path& path);
   // A copy of the descriptor.
   static Result<Output> to(int descriptor);
+  // The same of a regular file, which programs write to directly.
+  static Result<Output> in_place(int file);
 
   Output(Output&& other) noexcept;
   Output& operator=(Output&& other) = delete;
@@ -45,6 +51,7 @@ class Output {
   std::filesystem::path part_;    // empty: a stream
   data::Descriptor file_;         // of the part or the stream
   data::Descriptor unnamed_;      // of a stream, if another program writes
+  bool in_place_ = false;
 };
 
 }  // namespace windsplat::movie

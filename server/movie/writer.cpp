@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/animation/animation.hpp"
 #include "server/image/encode.hpp"
 #include "server/movie/child.hpp"
 #include "server/movie/ffmpeg.hpp"
@@ -31,7 +32,9 @@ Result<void> check(const Options& options) {
                                               " pixels: each edge has 1 to " +
                                               std::to_string(edge_max));
   }
-  if (options.fps >= fps_min && options.fps <= fps_max) return {};
+  const bool in_range =
+      options.fps >= protocol::animation_fps_min && options.fps <= protocol::animation_fps_max;
+  if (in_range) return {};
   return make_error(ErrorKind::invalid, "the pictures of a second are 0.1 to 240");
 }
 
@@ -162,6 +165,11 @@ Result<std::unique_ptr<Writer>> Writer::open(const std::filesystem::path& path,
 Result<std::unique_ptr<Writer>> Writer::open(int descriptor, const Options& options,
                                              const CancelToken& cancel) {
   return open_writer(options, cancel, [descriptor] { return Output::to(descriptor); });
+}
+
+Result<std::unique_ptr<Writer>> Writer::open_in_place(int file, const Options& options,
+                                                      const CancelToken& cancel) {
+  return open_writer(options, cancel, [file] { return Output::in_place(file); });
 }
 
 }  // namespace windsplat::movie

@@ -13,8 +13,6 @@
 
 namespace windsplat::movie {
 
-inline constexpr double fps_min = 0.1;
-inline constexpr double fps_max = 240;
 inline constexpr int edge_max = 8192;  // pixels
 
 struct Options {
@@ -39,6 +37,11 @@ class Writer {
   // it as it grows, a video at the end, from an unnamed file in the folder for temporary files.
   static Result<std::unique_ptr<Writer>> open(int descriptor, const Options& options,
                                               const CancelToken& cancel);
+
+  // The same to an empty regular file, open for reading and writing, which grows while pictures are
+  // added.
+  static Result<std::unique_ptr<Writer>> open_in_place(int file, const Options& options,
+                                                       const CancelToken& cancel);
 
   virtual ~Writer() = default;
   Writer(const Writer&) = delete;

@@ -26,7 +26,8 @@ MAY_INCLUDE = dependencies((PROJECT / "docs/design/overview.md").read_text())
 # third-party header -> the files that may include it, or include a project header that does
 CONFINED = [
     ("nlohmann/", r"nlohmann/",
-     r"protocol/(view/)?codec\w*\.[ch]pp|server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
+     r"protocol/((animation|view)/)?codec\w*\.[ch]pp|"
+     r"server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
      r"server/data/formats/plain/json_text\.[ch]pp|server/api/documents/\w+\.[ch]pp|tests/.*"),
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
     ("PROJ", r"proj\.h",

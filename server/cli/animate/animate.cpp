@@ -24,9 +24,6 @@
 namespace windsplat::cli {
 namespace {
 
-constexpr int per_step_max = 1000;
-constexpr double turn_max = 36000;  // degrees
-
 Error interrupted(int done, int total) {
   return make_error(ErrorKind::cancelled, "animate: interrupted after " + std::to_string(done) +
                                               " of " + std::to_string(total) + " frames");
@@ -43,45 +40,34 @@ struct Reports {
   std::string first_lacking;  // why the first of them does not
 };
 
-// The cameras from which a motion starts. Of a turn that of the first picture's completed view, for
-// both of a pair, which have one camera.
-Result<scene::Turn> first_camera(const Plan& plan, const Panel& panel) {
-  scene::Turn out;
-  out.camera = panel.view.camera;
-  if (!plan.turn) return out;
-  protocol::View view = panel.view;
-  view.step = plan.steps.first;
-  const auto completed = frame::complete(view, *panel.dataset, true);
-  if (!completed) return completed.error();
-  return scene::turn_of(panel.asked, *completed, *plan.turn);
-}
-
 Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& sheets,
                          FrameSink& sink, const CancelToken& cancel) {
   Reports reports;
-  const auto base = first_camera(plan, panels.front());
+  const movie::Motion& motion = plan.motion;
+  const int frames = motion.frames();
+  // Both of a pair have one camera.
+  const Panel& first = panels.front();
+  const auto base = motion.base(first.view, first.asked, [&first](const protocol::View& view) {
+    return frame::complete(view, *first.dataset, true);
+  });
   if (!base) return base.error();
-  std::vector<double> starts;  // of the motion
-  starts.reserve(panels.size());
-  for (const Panel& panel : panels) starts.push_back(panel.view.vector.motion_time);
+  std::vector<protocol::View> views;
+  views.reserve(panels.size());
+  for (const Panel& panel : panels) views.push_back(panel.view);
   Progress progress;
-  const std::string of_all = " of " + std::to_string(plan.frames) + " pictures";
-  for (int n = 0; n < plan.frames; ++n) {
-    progress.show(static_cast<double>(n) / plan.frames, std::to_string(n) + of_all);
-    const Moment now = plan.moment(n);
-    const auto camera = plan.camera(n, *base);
-    if (!camera) return camera.error();
+  const std::string of_all = " of " + std::to_string(frames) + " pictures";
+  for (int n = 0; n < frames; ++n) {
+    progress.show(static_cast<double>(n) / frames, std::to_string(n) + of_all);
     for (std::size_t p = 0; p < panels.size(); ++p) {
-      protocol::View& view = panels[p].view;
-      if (!panels[p].keeps_step) view.step = now.step;
-      view.vector.motion_time = starts[p] + plan.steps.stride * now.part;
-      view.camera = *camera;
+      auto view = motion.view_of(n, views[p], *base, panels[p].keeps_step);
+      if (!view) return view.error();
+      panels[p].view = std::move(*view);
     }
     const auto sheet = sheets.draw(cancel);
-    if (cancel.cancelled()) return interrupted(n, plan.frames);
+    if (cancel.cancelled()) return interrupted(n, frames);
     if (!sheet) return sheet.error();
     if (auto done = sink.add(n, *sheet); !done) {
-      return cancel.cancelled() ? interrupted(n, plan.frames) : done.error();
+      return cancel.cancelled() ? interrupted(n, frames) : done.error();
     }
     if (!sheet->exceeded.empty()) ++reports.exceeding;
     if (!sheet->empty.empty() && reports.empty++ == 0) reports.first_empty = sheet->empty;
@@ -92,7 +78,7 @@ Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& s
   }
   progress.show(1, "writing");
   if (auto done = sink.finish(); !done) {
-    return cancel.cancelled() ? interrupted(plan.frames, plan.frames) : done.error();
+    return cancel.cancelled() ? interrupted(frames, frames) : done.error();
   }
   return reports;
 }
@@ -135,8 +121,8 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   const auto start = std::chrono::steady_clock::now();
   const auto reports = draw_all(*plan, *panels, *sheets, *sink, cancel);
   if (!reports) return reports.error();
-  detail(std::to_string(plan->frames) + " pictures in " + seconds_text(seconds_since(start)) +
-         " to " + in_quotes(arguments.output));
+  detail(std::to_string(plan->motion.frames()) + " pictures in " +
+         seconds_text(seconds_since(start)) + " to " + in_quotes(arguments.output));
   note_remarks(*reports);
   if (arguments.report.empty()) return {};
   const std::string& lines = reports->lines;
@@ -174,23 +160,23 @@ void add_animate(CLI::App& app, Action& chosen) {
           ->add_option("--frames", arguments->frames,
                        "Pictures in all, spread evenly over the steps; default: one for each step, "
                        "those of a --path in seconds, or 120 for a --turn of one step")
-          ->check(CLI::Range(1, frames_max))
+          ->check(CLI::Range(1, protocol::animation_frames_max))
           ->type_name("N");
   command
       ->add_option("--per-step", arguments->per_step,
                    "Pictures for each step, for phase motion or a moving camera; default: 1")
-      ->check(CLI::Range(1, per_step_max))
+      ->check(CLI::Range(1, protocol::frames_per_step_max))
       ->excludes(frames)
       ->type_name("N");
   command->add_option("--fps", arguments->fps, "Pictures a second of a movie; default: 24")
-      ->check(between(movie::fps_min, movie::fps_max))
+      ->check(between(protocol::animation_fps_min, protocol::animation_fps_max))
       ->type_name("N");
   CLI::Option* turn =
       command
           ->add_option("--turn", arguments->turn,
                        "Turn the camera evenly about the vertical axis through its target by these "
                        "degrees, eastward; 360 repeats without a jump")
-          ->check(between(-turn_max, turn_max))
+          ->check(between(-protocol::turn_max, protocol::turn_max))
           ->type_name("DEGREES");
   command
       ->add_option("--path", arguments->path,

@@ -11,11 +11,8 @@ namespace windsplat::cli {
 
 Result<FrameSink> FrameSink::of(const Plan& plan, std::string output, const CancelToken& cancel) {
   const auto& container = plan.target.container;
-  if (container && movie::needs_ffmpeg(*container)) {
-    const auto ffmpeg = movie::find_ffmpeg();
-    if (!ffmpeg) return ffmpeg.error();
-    const auto encoder = movie::choose_encoder(*ffmpeg, *container);
-    if (!encoder) return encoder.error();
+  if (container) {
+    if (auto found = movie::check_encoder(*container); !found) return found.error();
   }
   return FrameSink(plan, std::move(output), cancel);
 }
@@ -36,7 +33,7 @@ Result<void> FrameSink::add(int frame, const Sheet& sheet) {
     options.container = *target.container;
     options.width = sheet.width;
     options.height = sheet.height;
-    options.fps = plan_->fps;
+    options.fps = plan_->motion.fps();
     auto opened = is_stdout(output_) ? movie::Writer::open(STDOUT_FILENO, options, cancel_)
                                      : movie::Writer::open(output_, options, cancel_);
     if (!opened) return opened.error();

@@ -1,8 +1,8 @@
 #include "server/cli/animate/plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <cmath>
 #include <utility>
 
 #include "protocol/camera_path.hpp"
@@ -14,14 +14,6 @@ namespace windsplat::cli {
 namespace {
 
 constexpr std::size_t digits_max = 9;
-constexpr int frames_of_a_turn = 120;  // of one step, without --frames
-
-bool draws_lines(const protocol::View& view, const data::DatasetInfo& info) {
-  using Kind = protocol::FieldChoice::Kind;
-  const Kind kind = view.vector.field.kind;
-  if (kind != Kind::dataset_default) return kind == Kind::named;
-  return info.first(data::FieldKind::vector) != nullptr;
-}
 
 // Steps that every panel which shows them has.
 int steps_of(const std::vector<Panel>& panels) {
@@ -32,84 +24,59 @@ int steps_of(const std::vector<Panel>& panels) {
   return static_cast<int>(least);
 }
 
-Result<Steps> chosen_steps(const AnimateArguments& arguments, const std::vector<Panel>& panels) {
-  const int step_count = steps_of(panels);
-  Steps steps;
-  steps.last = step_count - 1;
-  if (!arguments.steps.empty()) {
-    const auto chosen = parse_steps(arguments.steps);
-    if (!chosen) {
-      return make_error(ErrorKind::malformed, "--steps '" + printable(arguments.steps) +
-                                                  "' is not of the form 0:239 or 0:239:2");
-    }
-    steps = *chosen;
-  }
-  if (steps.last < step_count) return steps;
-  return make_error(ErrorKind::invalid,
-                    "--steps: the dataset's last step" +
-                        std::string(panels.size() > 1 ? " that both have is " : " is ") +
-                        std::to_string(step_count - 1));
-}
-
-Result<movie::CameraPath> read_path(const std::string& name) {
+Result<protocol::CameraPath> read_path(const std::string& name) {
   const auto text = read_text_file(name, protocol::limits::message_bytes_max);
   if (!text) return text.error();
   auto document = protocol::parse_camera_path(*text);
-  auto path = document ? movie::CameraPath::of(std::move(*document))
-                       : Result<movie::CameraPath>(document.error());
-  if (path) return path;
-  Error error = path.error();
+  if (document) return document;
+  Error error = document.error();
   error.message = "--path " + in_quotes(name) + ": " + error.message;
   return error;
 }
 
-// Options that exclude each other, or have no effect.
-Result<void> check_motion(const AnimateArguments& arguments, const Plan& plan,
-                          const std::vector<Panel>& panels) {
-  const protocol::View& view = panels.front().view;
-  const bool by_time = plan.path && plan.path->unit() == protocol::CameraPath::Unit::seconds;
-  if (arguments.fps && !plan.target.container && !by_time) {
-    return make_error(ErrorKind::invalid,
-                      "--fps: has no effect on numbered pictures, unless the camera follows a "
-                      "--path in seconds");
+Result<protocol::AnimationMotion> motion_of(const AnimateArguments& arguments) {
+  protocol::AnimationMotion motion;
+  if (!arguments.steps.empty()) {
+    const auto steps = parse_steps(arguments.steps);
+    if (!steps) {
+      return make_error(ErrorKind::malformed, "--steps '" + printable(arguments.steps) +
+                                                  "' is not of the form 0:239 or 0:239:2");
+    }
+    motion.steps = *steps;
   }
-  const bool moves = view.vector.motion == protocol::MotionMode::phase &&
-                     draws_lines(view, panels.front().dataset->info());
-  if (plan.turn || plan.path || moves || plan.frames <= plan.steps.count()) return {};
-  const bool many = arguments.frames.has_value();
-  return make_error(ErrorKind::invalid,
-                    (many ? "--frames: more pictures than steps would repeat them"
-                          : std::string("--per-step: has no effect")) +
-                        " unless the view has lines and /vector/motion/mode=phase, or the camera "
-                        "moves (--turn, --path)");
+  motion.frames = arguments.frames;
+  motion.per_step = arguments.per_step;
+  motion.fps = arguments.fps;
+  motion.turn = arguments.turn;
+  if (!arguments.path.empty()) {
+    auto path = read_path(arguments.path);
+    if (!path) return path.error();
+    motion.path = std::move(*path);
+  }
+  return motion;
 }
 
-// How many pictures: those asked for, or those of the path, or of the steps.
-Result<int> frames_of(const AnimateArguments& arguments, const Plan& plan) {
-  if (arguments.frames) return *arguments.frames;
-  const int steps = plan.steps.count();
-  double count = static_cast<double>(steps) * arguments.per_step.value_or(1);
-  if (!arguments.per_step) {
-    if (plan.path && plan.path->unit() == protocol::CameraPath::Unit::seconds) {
-      constexpr double rounding = 1e-9;
-      count = std::floor(plan.path->last() * plan.fps + rounding) + 1;
-    } else if (plan.turn && steps == 1) {
-      count = frames_of_a_turn;
-    }
+// Options in place of the pointers of a posted animation.
+Error named_by_option(Error error) {
+  constexpr std::array<std::array<const char*, 2>, 4> names{{{"/steps", "--steps"},
+                                                             {"/frames", "--frames"},
+                                                             {"/perStep", "--per-step"},
+                                                             {"/path", "--path"}}};
+  for (const auto& [pointer, option] : names) {
+    if (error.at.empty() || error.at.front().pointer != pointer) continue;
+    error.message = option + (": " + error.at.front().detail);
   }
-  if (count <= frames_max) return static_cast<int>(count);
-  return make_error(ErrorKind::invalid,
-                    "an animation has at most " + std::to_string(frames_max) + " pictures");
+  return error;
 }
 
 }  // namespace
 
-std::optional<Steps> parse_steps(std::string_view text) {
-  Steps steps;
+std::optional<protocol::StepRange> parse_steps(std::string_view text) {
+  protocol::StepRange steps{0, 0, 1};
   const char* at = text.data();
   const char* const end = at + text.size();
   int parts = 0;
-  for (int* number : {&steps.first, &steps.last, &steps.stride}) {
+  for (int* number : {&steps.first, &*steps.last, &steps.stride}) {
     if (parts > 0) {
       if (at == end) break;
       if (*at++ != ':') return std::nullopt;
@@ -119,7 +86,7 @@ std::optional<Steps> parse_steps(std::string_view text) {
     at = next;
     ++parts;
   }
-  const bool ordered = steps.first >= 0 && steps.last >= steps.first && steps.stride >= 1;
+  const bool ordered = steps.first >= 0 && *steps.last >= steps.first && steps.stride >= 1;
   if (at != end || parts < 2 || !ordered) return std::nullopt;
   return steps;
 }
@@ -192,51 +159,24 @@ Result<Target> target_of(const AnimateArguments& arguments) {
   return target;
 }
 
-Moment Plan::moment(int frame) const {
-  const std::int64_t at = static_cast<std::int64_t>(frame) * steps.count();
-  const std::int64_t index = at / frames;
-  return {steps.first + static_cast<int>(index) * steps.stride,
-          static_cast<double>(at % frames) / frames};
-}
-
-Result<protocol::CameraView> Plan::camera(int frame, const scene::Turn& base) const {
-  if (turn) return movie::turned(base.camera, *turn * frame / frames, base.centre);
-  if (!path) return base.camera;
-  if (path->unit() == protocol::CameraPath::Unit::seconds) return path->at(frame / fps);
-  const Moment now = moment(frame);
-  return path->at(now.step + steps.stride * now.part);
-}
-
 Result<Plan> plan_of(const AnimateArguments& arguments, Target target,
                      const std::vector<Panel>& panels) {
-  Plan plan;
-  plan.target = std::move(target);
-  const auto steps = chosen_steps(arguments, panels);
-  if (!steps) return steps.error();
-  plan.steps = *steps;
-  plan.fps = arguments.fps.value_or(plan.fps);
-  plan.turn = arguments.turn;
-  if (!arguments.path.empty()) {
-    auto path = read_path(arguments.path);
-    if (!path) return path.error();
-    plan.path = std::move(*path);
-  }
-  const auto frames = frames_of(arguments, plan);
-  if (!frames) return frames.error();
-  plan.frames = *frames;
-  if (auto valid = check_motion(arguments, plan, panels); !valid) return valid.error();
-  for (int n = 0; plan.path && n < plan.frames; ++n) {  // before an hour of drawing
-    if (const auto camera = plan.camera(n, {}); !camera) return camera.error();
+  auto asked = motion_of(arguments);
+  if (!asked) return asked.error();
+  const Panel& first = panels.front();
+  auto motion =
+      movie::Motion::of(std::move(*asked), first.view, first.dataset->info(), steps_of(panels));
+  if (!motion) return named_by_option(motion.error());
+  if (arguments.fps && !target.container && !motion->is_by_time()) {
+    return make_error(ErrorKind::invalid,
+                      "--fps: has no effect on numbered pictures, unless the camera follows a "
+                      "--path in seconds");
   }
   for (const Panel& panel : panels) {
-    const protocol::QualityView& limits = panel.view.quality;
-    if (plan.target.container && (limits.budget_ms || limits.max_error)) {
-      return make_error_at(ErrorKind::invalid, "/quality",
-                           "limits on time or error may change the size of a picture, and those of "
-                           "a movie have one size: set budgetMs and maxError to null");
-    }
+    if (!target.container) break;
+    if (auto fits = movie::check_size_is_fixed(panel.view); !fits) return fits.error();
   }
-  return plan;
+  return Plan{std::move(target), std::move(*motion)};
 }
 
 }  // namespace windsplat::cli

@@ -12,13 +12,10 @@
 #include "server/cli/beside/panels.hpp"
 #include "server/cli/picture.hpp"
 #include "server/frame/frame.hpp"
-#include "server/movie/camera_motion.hpp"
 #include "server/movie/container.hpp"
-#include "server/scene/defaults/turn.hpp"
+#include "server/movie/motion.hpp"
 
 namespace windsplat::cli {
-
-inline constexpr int frames_max = 1000000;
 
 struct AnimateArguments {
   ViewArguments view;
@@ -34,14 +31,8 @@ struct AnimateArguments {
   unsigned threads = 0;
 };
 
-struct Steps {
-  int first = 0;
-  int last = 0;
-  int stride = 1;
-  [[nodiscard]] int count() const { return (last - first) / stride + 1; }
-};
 // "A:B" or "A:B:S". Empty: malformed.
-std::optional<Steps> parse_steps(std::string_view text);
+std::optional<protocol::StepRange> parse_steps(std::string_view text);
 
 // A file name pattern with a zero-padded number.
 struct Pattern {
@@ -63,24 +54,9 @@ struct Target {
 // Errors: invalid for an output that is neither, and a format that its name contradicts.
 Result<Target> target_of(const AnimateArguments& arguments);
 
-// What a picture shows: a step of the dataset, and the part of the way to the next one shown, in
-// [0, 1), by which the phase of lines advances.
-struct Moment {
-  int step = 0;
-  double part = 0;
-};
-
 struct Plan {
   Target target;
-  Steps steps;
-  int frames = 1;
-  double fps = 24;
-  std::optional<double> turn;  // degrees
-  std::optional<movie::CameraPath> path;
-
-  [[nodiscard]] Moment moment(int frame) const;
-  // The camera of a picture whose view has that of `base`. Errors: those of CameraPath::at().
-  [[nodiscard]] Result<protocol::CameraView> camera(int frame, const scene::Turn& base) const;
+  movie::Motion motion;
 };
 
 // Errors: malformed or invalid for each option that is not valid or has no effect; those of reading

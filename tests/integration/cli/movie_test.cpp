@@ -200,7 +200,7 @@ TEST(CliMovie, OptionsWithoutEffectAndOutputsOfNoKindAreRefused) {
            Case{{"-o", "x.zip", "--fps", "nan"}, "--fps"},
            Case{{"-o", "x.zip", "--turn", "inf"}, "--turn"},
            Case{{"-o", "x.zip", "--turn", "1", "--path", "p.json"}, "--path"},
-           Case{{"-o", "x.zip", "--frames", "9"}, "--turn"},
+           Case{{"-o", "x.zip", "--frames", "9"}, "--frames: more pictures"},
            Case{{"-o", "x.zip", "--set", "/quality/maxError=0.1"}, "/quality"},
            Case{{"-o", "-", "--format", "zip", "--report", "-"}, "stdout is used by -o"},
            Case{{"-o", "x.zip", "--view", "-", "--path", "-"}, "stdin is used by --view"},
