@@ -47,8 +47,23 @@ void add_units(const ProbedField& field, Json& out) {
   }
 }
 
+Json animation_json(const AnimationDescription& animation) {
+  return Json{{"id", animation.id},
+              {"movie", animation.movie},
+              {"format", animation.format},
+              {"width", animation.width},
+              {"height", animation.height},
+              {"frames", animation.frames},
+              {"fps", canonical_number(animation.fps)},
+              {"bytes", animation.bytes},
+              {"expires", animation.expires}};
+}
+
 Json result_json(const JobResult& result) {
   if (const auto* const id = std::get_if<std::string>(&result)) return *id;
+  if (const auto* const animation = std::get_if<AnimationDescription>(&result)) {
+    return animation_json(*animation);
+  }
   const auto& reference = std::get<ReferenceDescription>(result);
   const bool differs = std::isfinite(reference.psnr);
   return Json{{"id", reference.id},

@@ -127,8 +127,22 @@ struct ReferenceDescription {
   friend bool operator==(const ReferenceDescription&, const ReferenceDescription&) = default;
 };
 
+// A finished animation.
+struct AnimationDescription {
+  std::string id;
+  std::string movie;   // path
+  std::string format;  // "mp4" | "webm" | "zip"
+  int width = 0;
+  int height = 0;
+  int frames = 0;
+  double fps = 0;
+  std::int64_t bytes = 0;
+  std::string expires;  // UTC
+  friend bool operator==(const AnimationDescription&, const AnimationDescription&) = default;
+};
+
 // A string is the id of an opened dataset.
-using JobResult = std::variant<std::string, ReferenceDescription>;
+using JobResult = std::variant<std::string, ReferenceDescription, AnimationDescription>;
 
 // Expected time and error of a picture at one of the settings that the server may choose. Names as
 // in FrameInfo.
@@ -156,7 +170,7 @@ struct ForecastDescription {
 // Asynchronous work requested by a client.
 struct JobDescription {
   std::string id;
-  std::string kind;   // "dataset" | "reference"
+  std::string kind;   // "dataset" | "reference" | "animation"
   std::string state;  // "queued" | "running" | "done" | "failed" | "cancelled"
   double progress = 0;
   std::optional<double> eta_ms;

@@ -1,5 +1,6 @@
 #include "protocol/utc_time.hpp"
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 
@@ -39,6 +40,14 @@ std::optional<double> days_since_2000(std::string_view utc) {
   constexpr std::chrono::sys_days epoch{std::chrono::year{2000} / 1 / 1};
   const double days = static_cast<double>((std::chrono::sys_days{date} - epoch).count());
   return days + (hour - 12) / 24.0 + minute / 1440.0 + second / 86400.0;
+}
+
+std::string utc_text(std::time_t time) {
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text.data();
 }
 
 }  // namespace windsplat::protocol

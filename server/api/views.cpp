@@ -1,6 +1,5 @@
 // Saved views: create, read, change and delete. Changes run on a separate thread, because they may
 // wait for a disk.
-#include <array>
 #include <ctime>
 #include <functional>
 #include <memory>
@@ -8,6 +7,7 @@
 #include <utility>
 
 #include "protocol/saved_view.hpp"
+#include "protocol/utc_time.hpp"
 #include "server/api/resources.hpp"
 #include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
@@ -22,15 +22,6 @@ using views::SavedViews;
 
 std::string text_of(const SavedViews& views, const SavedView& saved) {
   return protocol::encode_saved_view(saved, views.on_disk() ? "disk" : "memory");
-}
-
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text.data();
 }
 
 http::Response saved_response(const SavedViews& views, const SavedView& saved) {
@@ -92,7 +83,7 @@ void post_saved_view(SavedViews& views, tasks::TaskExecutor& view_io, const std:
   }
   run_later(view_io, request, std::move(reply), "saving a view", nullptr,
             [&views, &base_path, view = std::move(*view)] {
-              const auto saved = views.add(view, utc_now());
+              const auto saved = views.add(view, protocol::utc_text(std::time(nullptr)));
               if (!saved) return http::problem_response(saved.error());
               http::Response response = saved_response(views, *saved);
               response.status = 201;

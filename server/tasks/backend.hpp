@@ -13,6 +13,7 @@
 #include "server/image/video_streams.hpp"
 #include "server/metrics/metrics.hpp"
 #include "server/quality/tables.hpp"
+#include "server/tasks/animation/animations.hpp"
 #include "server/tasks/catalogue.hpp"
 #include "server/tasks/jobs.hpp"
 #include "server/tasks/known_ranges.hpp"
@@ -55,6 +56,7 @@ struct Backend {
   KnownRanges ranges;
   RequestTimes request_times;
   References references;
+  Animations animations;
   Jobs jobs;               // use the catalogue and the renderer: ended before them
   RenderService renderer;  // uses the members above
   TaskExecutor loads;      // use the members above, including the renderer: ended first

@@ -3,18 +3,15 @@
 #include "server/tasks/reference_job.hpp"
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
-#include <functional>
-#include <mutex>
-#include <optional>
+#include <memory>
 #include <utility>
 
 #include "protocol/codec.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/frame/reference.hpp"
 #include "server/scene/completed_view.hpp"
-#include "server/tasks/run_guarded.hpp"
+#include "server/tasks/animation/background.hpp"
 
 namespace windsplat::tasks {
 namespace {
@@ -22,52 +19,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds strip_time{100};
-constexpr std::chrono::milliseconds notice_time{20};
-
-// State shared by the job's thread and the renderer; lives until both are done.
-struct Strip {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::optional<Result<void>> outcome;
-};
-
-// Owner of the render jobs and the address charged.
-struct DrawingOwner {
-  std::uint64_t owner = 0;
-  std::string payer;
-};
-
-// Runs `draw` on the renderer's thread as a background job, again after each interruption, until
-// its result is not `cancelled` or the job is cancelled. Copies `draw`, which may outlive the call
-// briefly.
-Result<void> in_background(Backend& backend, const DrawingOwner& owner, const CancelToken& unwanted,
-                           const std::function<Result<void>(const CancelToken&)>& draw) {
-  while (!unwanted.cancelled()) {
-    const auto strip = std::make_shared<Strip>();
-    RenderJob job;
-    job.kind = RenderKind::background;
-    job.owner = owner.owner;
-    job.payer = owner.payer;
-    const CancelToken stop = job.cancel;
-    job.run = [strip, draw, stop](std::int64_t /*queue_us*/) {
-      auto outcome = run_guarded<void>("a reference", stop, [&] { return draw(stop); });
-      const std::lock_guard lock(strip->mutex);
-      strip->outcome = std::move(outcome);
-      strip->changed.notify_one();
-    };
-    if (auto queued = backend.renderer.submit(std::move(job)); !queued) return queued.error();
-    std::unique_lock lock(strip->mutex);
-    while (
-        !strip->changed.wait_for(lock, notice_time, [&] { return strip->outcome.has_value(); })) {
-      if (!unwanted.cancelled()) continue;
-      stop.cancel();
-      return make_error(ErrorKind::cancelled, "reference cancelled");
-    }
-    Result<void> outcome = *strip->outcome;
-    if (outcome || outcome.error().kind != ErrorKind::cancelled) return outcome;
-  }
-  return make_error(ErrorKind::cancelled, "reference cancelled");
-}
 
 // All inputs that determine the picture and its error.
 std::string id_of(const protocol::View& completed, const data::Dataset& dataset) {
@@ -96,7 +47,7 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                               handle.cancel, memory);
   if (!begun) return begun.error();
   const std::shared_ptr<frame::ReferenceDrawing> drawing = std::move(*begun);
-  const DrawingOwner owner{backend.references.next_owner(), payer};
+  const BackgroundOwner owner{backend.references.next_owner(), payer};
   while (drawing->done() < 1) {
     const auto drawn = in_background(backend, owner, handle.cancel,
                                      [&backend, drawing](const CancelToken& stop) -> Result<void> {

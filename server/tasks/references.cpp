@@ -47,11 +47,15 @@ Result<References::Ticket> References::admit(const std::string& address,
   const bool has_one = std::any_of(wanted_.begin(), wanted_.end(),
                                    [&](const Wanted& one) { return one.address == address; });
   if (has_one) {
-    return too_many("a reference is being drawn for this address; cancel its job or wait for it");
+    return too_many(
+        "a reference or an animation is being drawn for this address; cancel its job or wait for "
+        "it");
   }
   if (wanted_.size() >= wanted_max) {
     std::string detail = std::to_string(wanted_max);
-    detail += " references are waiting or being drawn, which is the limit; try again later";
+    detail +=
+        " references and animations are waiting or being drawn, which is the limit; try again "
+        "later";
     return too_many(std::move(detail));
   }
   auto ticket = std::make_shared<const char>();

@@ -33,8 +33,8 @@ class References {
   void keep(Kept kept);
   std::optional<Kept> find(const std::string& id);
 
-  // Admits one drawing, valid while the value is held and `cancel` is not raised; one at a time per
-  // address. Errors: busy.
+  // Admits one drawing, also of an animation, valid while the value is held and `cancel` is not
+  // raised; one at a time per address. Errors: busy.
   using Ticket = std::shared_ptr<const void>;
   Result<Ticket> admit(const std::string& address, const CancelToken& cancel);
   // Owner id of render jobs; distinct from all connection ids.

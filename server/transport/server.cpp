@@ -127,6 +127,7 @@ struct Server::State {
       const auto look = [this] {
         auto found = tasks::run_guarded<std::vector<std::string>>("file check", never, [this] {
           end_expired_uploads();
+          parts.backend.animations.expire();
           return parts.backend.catalogue.look_after();
         });
         std::vector<std::string> changed;

@@ -1,14 +1,13 @@
 // Uploads: the body of a PUT goes to a file while it is received; its datasets live as long as it.
 #include "server/uploads/uploads.hpp"
 
-#include <array>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "protocol/measurements.hpp"
+#include "protocol/utc_time.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/http/body_sink.hpp"
@@ -52,18 +51,10 @@ class UploadSink final : public http::BodySink {
   const CancelToken cancel_;
 };
 
-std::string time_text(std::time_t time) {
-  std::tm utc{};
-  gmtime_r(&time, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text.data();
-}
-
 http::Response upload_response(const uploads::Upload& upload) {
   const std::string digest = uploads::digest_text(upload.digest);
-  http::Response response = json_response(
-      protocol::encode_upload({upload.id, upload.bytes, digest, time_text(upload.expires)}));
+  http::Response response = json_response(protocol::encode_upload(
+      {upload.id, upload.bytes, digest, protocol::utc_text(upload.expires)}));
   response.headers = {{"Cache-Control", "no-store"}};
   return response;
 }

@@ -1,0 +1,70 @@
+// Finished animations: files without a name, kept for a while and within a limit on their bytes.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "protocol/measurements.hpp"
+#include "server/base/error.hpp"
+#include "server/data/files/descriptor.hpp"
+
+namespace windsplat::tasks {
+
+// The content of a file in memory, as the system keeps it: pages are read when they are used. The
+// file has no name, so that nothing else changes it.
+class MappedFile {
+ public:
+  // Errors: internal.
+  static Result<std::shared_ptr<const MappedFile>> of(const data::Descriptor& file);
+  ~MappedFile();
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
+
+ private:
+  explicit MappedFile(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  std::span<const std::uint8_t> bytes_;
+};
+
+// Thread-safe.
+class Animations {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  static constexpr int frames_max = 3600;
+  static constexpr double pixels_max = 4e9;     // of all pictures of one
+  static constexpr double render_s_max = 3600;  // expected, of all pictures of one
+  static constexpr std::int64_t bytes_max = std::int64_t{256} << 20;     // of one
+  static constexpr std::int64_t kept_bytes_max = std::int64_t{1} << 30;  // of all
+  static constexpr std::chrono::seconds lasts{3600};
+
+  struct Kept {
+    protocol::AnimationDescription description;
+    std::string file_name;  // suggested to those who save it
+    std::shared_ptr<const MappedFile> file;
+  };
+
+  // The oldest ones make room. Files that are being sent exist until that ends.
+  void keep(Kept kept, Clock::time_point now = Clock::now());
+  [[nodiscard]] std::optional<Kept> find(const std::string& id,
+                                         Clock::time_point now = Clock::now());
+  // Removes those whose time is over. Call it periodically.
+  void expire(Clock::time_point now = Clock::now());
+
+ private:
+  struct Entry {
+    Kept kept;
+    Clock::time_point until;
+  };
+  std::mutex mutex_;
+  std::list<Entry> entries_;  // oldest first
+};
+
+}  // namespace windsplat::tasks
