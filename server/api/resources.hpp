@@ -94,6 +94,12 @@ void post_reference(tasks::Backend& backend, access::Admission& admission,
                     const std::string& base_path, const http::Request& request, http::Reply reply);
 http::Response get_reference(tasks::References& references, const std::string& name,
                              const http::Request& request);
+// The movie of a view: drawn by a job, then kept for a while.
+void post_animation(tasks::Backend& backend, access::Admission& admission,
+                    tasks::TaskExecutor& look_ups, const std::string& base_path,
+                    const http::Request& request, http::Reply reply);
+http::Response get_animation(tasks::Animations& animations, const std::string& name,
+                             const http::Request& request);
 // What a pixel of a posted view shows.
 void post_pick(tasks::Backend& backend, const http::Request& request, http::Reply reply);
 // Estimated time and error of a picture of a posted view.

@@ -114,7 +114,7 @@ std::vector<Route> service_routes(const ServerOptions& options, const std::atomi
 }
 
 std::vector<Route> picture_routes(const std::string& base_path, access::Admission& admission,
-                                  tasks::Backend& backend) {
+                                  tasks::Backend& backend, tasks::TaskExecutor& look_ups) {
   return {
       Route{"POST", "/v1/frames", operations::draw_view(), later(post_frame, backend, admission),
             Charge::valid_picture},
@@ -125,6 +125,10 @@ std::vector<Route> picture_routes(const std::string& base_path, access::Admissio
             later(post_reference, backend, admission, base_path), Charge::valid_picture},
       Route{"GET", "/v1/references/{id}", operations::read_reference(),
             at_once(get_reference, backend.references)},
+      Route{"POST", "/v1/animations", operations::draw_animation(),
+            later(post_animation, backend, admission, look_ups, base_path), Charge::valid_picture},
+      Route{"GET", "/v1/animations/{id}", operations::read_animation(),
+            at_once(get_animation, backend.animations)},
   };
 }
 
@@ -240,7 +244,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
   const DocumentsPtr described = documents_of(options);
   std::vector<Route> table;
   for (auto part : {service_routes(options, draining, backend, described),
-                    picture_routes(options.base_path, admission, backend),
+                    picture_routes(options.base_path, admission, backend, look_ups),
                     frame_routes(backend, admission, *options.views), view_routes(options, view_io),
                     dataset_routes(options, backend, look_ups),
                     upload_routes(options, upload_io, backend.catalogue)}) {

@@ -107,6 +107,7 @@ http::Response get_service(const ServerOptions& options) {
                    {"datasets", base + "v1/datasets"},
                    {"frames", base + "v1/frames"},
                    {"references", base + "v1/references"},
+                   {"animations", base + "v1/animations"},
                    {"forecasts", base + "v1/forecasts"},
                    {"picks", base + "v1/picks"},
                    {"views", base + "v1/views"},

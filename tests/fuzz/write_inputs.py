@@ -72,7 +72,7 @@ TARGETS = [
     "/v1/presets", "/v1/datasets", "/v1/datasets/climate", "/v1/jobs", "/v1/jobs/1",
     "/v1/files", "/v1/files?folder=runs&after=a.nc&limit=2", "/v1/files?folder=../..",
     "/v1/views/0123456789", "/v1/references/abc", "/v1/stream", "*", "http://localhost/v1",
-    "/v1/uploads/a.nc?keep=9",
+    "/v1/animations/abc.mp4", "/v1/uploads/a.nc?keep=9",
     "/v1/datasets/climate/frame.jpeg?width=16&height=12&azimuth=30&elevation=20&zoom=1.5&quality=9",
     "/v1/datasets/climate/frame.png?step=1&width=8&height=8&preset=top",
     "/v1/datasets/climate/frame.npy?width=4&height=4",

@@ -112,6 +112,7 @@ class Requests:
         self.values = schema_values.Values(document.document, draw)
         self.fields = ["none"]
         self.ids = {"datasets": ["small", "gusts"], "views": [], "jobs": [], "references": [],
+                    "animations": [],
                     "uploads": ["a.nc", "b.raw"], "problems": ["not-found", "invalid-view"]}
         self.tags = []
 
@@ -126,7 +127,9 @@ class Requests:
         told = json.loads(body)
         kind = "views" if status == 201 else "jobs"
         result = told.get("result")
-        if isinstance(result, dict):
+        if isinstance(result, dict) and "movie" in result:
+            self.keep("animations", result["movie"].split("/")[-1])
+        elif isinstance(result, dict):
             self.keep("references", result["id"] + ".png")
         elif isinstance(result, str):
             self.keep("datasets", result)

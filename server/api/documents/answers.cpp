@@ -59,10 +59,11 @@ struct Header {
   bool required = true;  // of every answer that lists it
 };
 
-constexpr std::array<Header, 13> known_headers{{
+constexpr std::array<Header, 14> known_headers{{
     {"X-Request-Id", "string", "Id of the request, as in the log of the server."},
     {"ETag", "string", "Tag of the content, for If-None-Match and If-Match.", false},
     {"Location", "string", "Path of the job or of what was made."},
+    {"Content-Disposition", "string", "Name of the file for those who save it (RFC 6266)."},
     {"Link", "string", "Descriptions of the service (RFC 8288)."},
     {"Retry-After", "integer", "Seconds until another attempt may succeed."},
     {"Server-Timing", "string", "Times of queue, render and encode, milliseconds."},

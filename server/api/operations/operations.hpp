@@ -30,6 +30,8 @@ Operation forecast_view();
 Operation pick_feature();
 Operation draw_reference();
 Operation read_reference();
+Operation draw_animation();
+Operation read_animation();
 
 // datasets.cpp
 Operation list_files();

@@ -131,4 +131,30 @@ Operation read_reference() {
           .problems = {404}};
 }
 
+Operation draw_animation() {
+  return {.id = "drawAnimation",
+          .group = pictures_group,
+          .summary = "A movie of a view, in a job",
+          .description =
+              "The result of the job has the address of the movie. It is drawn while "
+              "the server is otherwise idle.",
+          .body = RequestBody{"animationRequest", {json_media}, "The view and its motion."},
+          .answers = {job_answer()},
+          .problems = {404, 422, 507}};
+}
+
+Operation read_animation() {
+  return {.id = "readAnimation",
+          .group = pictures_group,
+          .summary = "The file of a finished animation",
+          .description = "The id ends in .mp4, .webm or .zip.",
+          .answers = {{200,
+                       "The movie.",
+                       {},
+                       {"video/mp4", "video/webm", "application/zip"},
+                       {"ETag", "Content-Disposition"}},
+                      not_modified()},
+          .problems = {404}};
+}
+
 }  // namespace windsplat::api::operations
