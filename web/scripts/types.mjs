@@ -100,7 +100,8 @@ export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};
 }
 
 // Answers of REST that no message of the stream contains.
-const answers = ["colorMaps", "fieldRange", "folder", "forecast", "frameInfo", "histogram"];
+const answers = ["animation", "animationRequest", "colorMaps", "fieldRange", "folder", "forecast"];
+answers.push("frameInfo", "histogram");
 answers.push("job", "jobs", "pick", "presets", "probe", "savedView", "series", "service");
 
 async function generateAnswers() {

@@ -1,12 +1,22 @@
 // A server as programs use it: its resources over REST, with a token if it asks for one, and
 // streams of its views.
-import type { ColorMaps, FrameInfo, Jobs, Presets, SavedView, Service } from "../generated/answers";
+import type {
+  Animation,
+  AnimationRequest,
+  ColorMaps,
+  FrameInfo,
+  Job,
+  Jobs,
+  Presets,
+  SavedView,
+  Service,
+} from "../generated/answers";
 import { Api, type Probe } from "../wire/api";
 import { addressOf, settingsOf } from "../wire/arguments";
 import type { SocketClass } from "../wire/browser_link";
-import { drawFrame, type FetchLike } from "../wire/frame_request";
+import { drawFrame, waitFor, type FetchLike, type Wait } from "../wire/frame_request";
 import type { View } from "../wire/protocol";
-import { posted, UnreachableError } from "../wire/requests";
+import { posted, ProblemError, problemText, UnreachableError } from "../wire/requests";
 import { ViewStream, type StreamEvents, type StreamOptions } from "./view_stream";
 
 export interface ClientOptions {
@@ -19,6 +29,12 @@ export interface PictureOptions {
   type?: "image/png" | "image/jpeg" | "image/svg+xml" | "application/pdf" | "application/x-npy";
   dotsPerInch?: number; // of PNG, PDF and SVG
   signal?: AbortSignal;
+}
+
+export interface FollowOptions {
+  progress?: (job: Job) => void; // called with every state of the job
+  signal?: AbortSignal; // ends the job
+  wait?: Wait;
 }
 
 export interface Place {
@@ -55,6 +71,14 @@ const isList =
   (key: string) =>
   (answer: Record<string, unknown>): boolean =>
     Array.isArray(answer[key]);
+
+const isJob = (answer: Record<string, unknown>): boolean =>
+  typeof answer.id === "string" && typeof answer.state === "string";
+
+const isOpen = ({ state }: Job): boolean => state === "queued" || state === "running";
+
+const pollFirstMs = 50;
+const pollMostMs = 1000;
 
 const isSaved = (answer: Record<string, unknown>): boolean =>
   typeof answer.id === "string" && typeof answer.view === "object";
@@ -97,6 +121,45 @@ export class Client extends Api {
   /** A view drawn to a picture. A busy server is asked again after the time that it states. */
   frame(view: View, { signal, ...asked }: PictureOptions = {}): Promise<Blob> {
     return drawFrame(this.send, this.url, view, signal ?? new AbortController().signal, asked);
+  }
+
+  // --- movies ----------------------------------------------------------------------------
+
+  /** Begins a movie of a view, as a job of the server: see finished(). */
+  createAnimation(request: AnimationRequest): Promise<Job> {
+    return this.get<Job>("v1/animations", isJob, posted(request));
+  }
+
+  /** Follows a job until it is over: its result. A job that failed is a ProblemError. */
+  async finished(started: Job, options: FollowOptions = {}): Promise<Job["result"]> {
+    const { progress, signal = new AbortController().signal, wait = waitFor } = options;
+    let job = started;
+    try {
+      for (let ms = pollFirstMs; isOpen(job); ms *= 1.5) {
+        progress?.(job);
+        await wait(Math.min(ms, pollMostMs), signal);
+        job = await this.get<Job>(`v1/jobs/${encodeURIComponent(job.id)}`, isJob, { signal });
+      }
+    } catch (failure) {
+      if (signal.aborted) await this.cancelJob(job.id).catch(() => {}); // it may have finished
+      throw failure;
+    }
+    progress?.(job);
+    if (job.state === "done") return job.result;
+    const { problem } = job;
+    const text = problem === null ? `the job was ${job.state}` : problemText(problem);
+    throw new ProblemError(text, problem?.status ?? 0, problem);
+  }
+
+  /** The file of a finished animation, while the server keeps it. */
+  async movie({ movie }: Pick<Animation, "movie">, signal?: AbortSignal): Promise<Blob> {
+    return (await this.answer(movie, { signal: signal ?? null })).blob();
+  }
+
+  /** A movie of a view, once it is drawn. */
+  async animate(request: AnimationRequest, options: FollowOptions = {}): Promise<Blob> {
+    const result = await this.finished(await this.createAnimation(request), options);
+    return this.movie(result as Animation, options.signal);
   }
 
   // --- resources besides those of the page -----------------------------------------------
@@ -164,4 +227,5 @@ export class Client extends Api {
   }
 }
 
+export type { Animation, AnimationRequest };
 export type { ColorMaps, FrameInfo, Jobs, Presets, SavedView, Service };
