@@ -1,4 +1,4 @@
-"""Movies: pictures of several views in one file."""
+"""Movies: drawn by a job of the server, or made here of the pictures of any views."""
 from __future__ import annotations
 
 import base64
@@ -15,7 +15,7 @@ import zipfile
 import zlib
 from typing import Any, Callable, Iterable, Iterator, Mapping, Sequence
 
-from .errors import MovieFailed
+from .errors import MovieFailed, WindsplatError
 from .view import View
 
 CODECS: Mapping[str, Sequence[str]] = {
@@ -29,6 +29,7 @@ COLOURS = ("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "i
 KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".apng": "image/png"}
 SUFFIXES = (*CODECS, ".apng", ".zip")
 PNG_START = b"\x89PNG\r\n\x1a\n"
+OF_SERVER = (".mp4", ".webm", ".zip")  # what its jobs write
 INLINE_BYTES_MAX = 20_000_000  # of a movie in the text of a notebook
 
 
@@ -125,12 +126,11 @@ def write_apng(path: pathlib.Path, count: int, frames: Iterator[bytes], fps: flo
         file.write(_chunk(b"IEND", b""))
 
 
-def write_zip(path: pathlib.Path, count: int, frames: Iterator[bytes]) -> None:
-    """A ZIP of frame_0000.png and so on."""
-    digits = max(4, len(str(count - 1)))
+def write_zip(path: pathlib.Path, frames: Iterator[bytes]) -> None:
+    """A ZIP of frame_000000.png and so on, as the server writes it."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as file:
         for index, png in enumerate(frames):
-            file.writestr(f"frame_{index:0{digits}d}.png", png)
+            file.writestr(f"frame_{index:06d}.png", png)
 
 
 def write_video(path: pathlib.Path, suffix: str, frames: Iterator[bytes], fps: float,
@@ -157,6 +157,59 @@ def write_video(path: pathlib.Path, suffix: str, frames: Iterator[bytes], fps: f
             raise MovieFailed(f"ffmpeg ended with exit code {process.returncode}: {text}")
 
 
+def _suffix_of(path: pathlib.Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"'{path}' does not end in {', '.join(SUFFIXES)}")
+    return suffix
+
+
+@contextlib.contextmanager
+def _part_of(path: pathlib.Path) -> Iterator[pathlib.Path]:
+    """A name to write to, which becomes `path` unless there is an error."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def step_range(steps: Iterable[int]) -> dict[str, int] | None:
+    """Steps as the server's animations state them. None: they are at no equal distances."""
+    every = [int(step) for step in steps]
+    stride = every[1] - every[0] if len(every) > 1 else 1
+    if not every or stride < 1 or every != list(range(every[0], every[-1] + 1, stride)):
+        return None
+    return {"first": every[0], "last": every[-1], "stride": stride}
+
+
+def animation(
+    path: pathlib.Path, view: View, motion: Mapping[str, Any], timeout: float,
+    progress: Callable[[int, int], object] | None,
+) -> Movie:
+    """Has the server draw a movie of a view, and writes it. `motion`: keys of POST /v1/animations
+    besides view and format, of which those that are None are left out.
+
+    The job is ended if it takes longer than `timeout` seconds, or this call is interrupted. Raises
+    the Problem that the server reports, JobTimeout.
+    """
+    server = view.dataset.server
+    asked = {key: value for key, value in motion.items() if value is not None}
+    asked |= {"view": view.to_dict(), "format": path.suffix.lower()[1:]}
+    job = server.http.request("POST", "v1/animations", json=asked).json()
+    tell = None if progress is None else lambda done: progress(round(100 * done), 100)
+    try:
+        made = server.finished(job, timeout, tell)
+    except BaseException:
+        with contextlib.suppress(WindsplatError):
+            server.http.request("DELETE", f"v1/jobs/{job['id']}")
+        raise
+    with _part_of(path) as part:
+        part.write_bytes(server.http.request("GET", made["movie"], accept="*/*").content)
+    return Movie(path, made["frames"], made["fps"], made["width"], made["height"])
+
+
 def movie(
     path: str | os.PathLike[str], views: Iterable[View], fps: float = 12, *, workers: int = 2,
     progress: Callable[[int, int], object] | None = None,
@@ -173,9 +226,7 @@ def movie(
     view.frame() raises.
     """
     out = pathlib.Path(path)
-    suffix = out.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ValueError(f"'{os.fspath(path)}' does not end in {', '.join(SUFFIXES)}")
+    suffix = _suffix_of(out)
     if not 0.1 <= fps <= 120:
         raise ValueError(f"fps must be 0.1 to 120, not {fps:g}")
     if not 1 <= workers <= 16:
@@ -203,16 +254,12 @@ def movie(
             if progress is not None:
                 progress(index + 1, len(every))
 
-    part = out.with_name(f".{out.name}.part")
-    try:
+    with _part_of(out) as part:
         if suffix == ".apng":
             write_apng(part, len(every), counted(), fps)
         elif suffix == ".zip":
-            write_zip(part, len(every), counted())
+            write_zip(part, counted())
         else:
             assert program is not None
             write_video(part, suffix, counted(), fps, program)
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
     return Movie(out, len(every), fps, *size)

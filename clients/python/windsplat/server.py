@@ -232,8 +232,10 @@ class Server:
         job = self.http.request("POST", "v1/datasets", json=dict(body)).json()
         return Dataset(self, str(self.finished(job, timeout)))
 
-    def finished(self, job: Mapping[str, Any], timeout: float) -> Any:
-        """The result of a job. Raises its Problem or JobTimeout."""
+    def finished(self, job: Mapping[str, Any], timeout: float,
+                 progress: Callable[[float], object] | None = None) -> Any:
+        """The result of a job. `progress` is called with the fraction that is done. Raises its
+        Problem or JobTimeout."""
         end = time.monotonic() + timeout
         pause = POLL_FIRST
         while job["state"] not in ("done", "failed", "cancelled"):
@@ -243,6 +245,8 @@ class Server:
             time.sleep(pause)
             pause = min(POLL_MOST, pause * 1.5)
             job = self.http.get(f"v1/jobs/{job['id']}")
+            if progress is not None:
+                progress(float(job["progress"]))
         if job["state"] == "failed":
             raise problem_of(job["problem"])
         if job["state"] == "cancelled":

@@ -274,14 +274,36 @@ class View(ViewParts):
 
     def movie(
         self, path: str | os.PathLike[str], steps: Iterable[int] | None = None, fps: float = 12,
-        *, workers: int = 2, progress: Any = None,
+        *, turn: float | None = None, camera_path: Mapping[str, Any] | None = None,
+        frames: int | None = None, per_step: int | None = None, workers: int | None = None,
+        timeout: float = 3600, progress: Callable[[int, int], object] | None = None,
     ) -> Movie:
-        """A movie of the steps of the dataset, by default of all of them (see
-        windsplat.movie)."""
-        from .movie import movie
+        """A movie of the steps of the dataset, by default of all of them.
 
-        chosen = range(len(self.dataset.steps)) if steps is None else steps
-        return movie(path, [self.at(int(step)) for step in chosen], fps, workers=workers,
+        path: .mp4, .webm and .zip (PNG files) are drawn by a job of the server, which needs the
+            program ffmpeg for the first two; .apng is made here.
+        turn: degrees by which the camera turns about the vertical axis, eastward.
+        camera_path: keyframes of the camera (POST /v1/animations) in place of a turn.
+        frames, per_step: of the movie in all, or for each step.
+        workers: draws the pictures by single requests, so many at a time, and makes any movie
+            here (see windsplat.movie). So are those of steps at unequal distances.
+        timeout: seconds after which the job of the server is ended.
+        progress: called with what is done and all of it: of a job per cent, otherwise frames.
+
+        Raises the Problem that the server reports, JobTimeout, and what windsplat.movie raises.
+        """
+        from .movie import OF_SERVER, animation, movie, step_range
+
+        out = pathlib.Path(path)
+        chosen = list(range(len(self.dataset.steps)) if steps is None else steps)
+        shown = step_range(chosen)
+        moves = {"turn": turn, "path": camera_path, "frames": frames, "perStep": per_step}
+        if workers is None and shown is not None and out.suffix.lower() in OF_SERVER:
+            return animation(out, self, {**moves, "steps": shown, "fps": fps}, timeout, progress)
+        if any(value is not None for value in moves.values()):
+            raise ValueError("turn, camera_path, frames and per_step are for movies of the server: "
+                             f"{', '.join(OF_SERVER)} of steps at equal distances, without workers")
+        return movie(out, [self.at(int(step)) for step in chosen], fps, workers=workers or 2,
                      progress=progress)
 
     # --- Jupyter and the page ------------------------------------------------------------------

@@ -244,12 +244,52 @@ class Movies(unittest.TestCase):
         self.assertEqual(metadata["image/png"], {"width": 63, "height": 40})
         self.assertEqual(list(self.folder.iterdir()), [path])
 
-    def test_a_zip_has_all_steps_in_order(self):
-        self.view.movie(self.folder / "a.zip", workers=3)
-        with zipfile.ZipFile(self.folder / "a.zip") as file:
-            names = file.namelist()
-            self.assertEqual(names, [f"frame_{k:04d}.png" for k in range(8)])
-            self.assertEqual(file.read(names[5]), self.view.at(5).frame().bytes)
+    def test_a_zip_has_all_steps_in_order_whoever_makes_it(self):
+        for workers in (None, 3):
+            movie = self.view.movie(self.folder / "a.zip", workers=workers)
+            self.assertEqual((movie.frames, movie.fps, movie.width, movie.height), (8, 12, 63, 40))
+            with zipfile.ZipFile(self.folder / "a.zip") as file:
+                names = file.namelist()
+                self.assertEqual(names, [f"frame_{k:06d}.png" for k in range(8)])
+                self.assertEqual(file.read(names[5]), self.view.at(5).frame().bytes)
+
+    def test_the_server_draws_steps_and_turns(self):
+        path = self.folder / "a.zip"
+        seen = []
+        movie = self.view.movie(path, steps=range(1, 8, 3),
+                                progress=lambda done, count: seen.append((done, count)))
+        self.assertEqual(movie.frames, 3)
+        self.assertEqual(seen, sorted(seen))
+        self.assertEqual({count for _, count in seen}, {100})
+        with zipfile.ZipFile(path) as file:
+            self.assertEqual(file.read("frame_000002.png"), self.view.at(7).frame().bytes)
+        view = self.view.patch({"camera": {"eye": [2, -2, 1], "target": [0, 0, 0]}})
+        self.assertEqual(view.movie(path, steps=[0], turn=360, frames=4).frames, 4)
+        with zipfile.ZipFile(path) as file:
+            self.assertEqual(file.read("frame_000000.png"), view.frame().bytes)
+            self.assertNotEqual(file.read("frame_000001.png"), view.frame().bytes)
+        key = {"projection": "perspective", "target": [0, 0, 0]}
+        keys = [{"time": at, "camera": {**key, "eye": [2, -2, 1 + at]}} for at in (0, 1)]
+        self.assertEqual(view.movie(path, steps=[0], camera_path={"keyframes": keys}).frames, 13)
+
+    def test_a_job_that_takes_too_long_is_ended(self):
+        view = self.view.size(800, 600)
+        with self.assertRaises(windsplat.JobTimeout):
+            view.movie(self.folder / "a.zip", steps=[0], turn=360, frames=500, timeout=0.3)
+        jobs = self.server.http.get("v1/jobs")["jobs"]
+        self.assertEqual(jobs[-1]["kind"], "animation")
+        self.server.http.request("DELETE", f"v1/jobs/{jobs[-1]['id']}")
+        self.assertIn(jobs[-1]["state"], ("running", "cancelled"))
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_motions_of_the_server_are_refused_where_it_does_not_draw(self):
+        for given in ({"turn": 90, "workers": 2}, {"frames": 4, "steps": [0, 1, 5]}):
+            with self.assertRaisesRegex(ValueError, "at equal distances"):
+                self.view.movie(self.folder / "a.zip", **given)
+        with self.assertRaises(ValueError):
+            self.view.movie(self.folder / "a.apng", turn=90)
+        with self.assertRaisesRegex(windsplat.InvalidView, "/frames"):
+            self.view.movie(self.folder / "a.zip", frames=99)
 
     def test_videos_are_encoded_by_ffmpeg(self):
         folder = str(pathlib.Path(self.encoder()).parent)
@@ -263,10 +303,10 @@ class Movies(unittest.TestCase):
     def test_without_ffmpeg_other_kinds_are_named_and_nothing_is_written(self):
         with unittest.mock.patch.dict(os.environ, {"PATH": "/nowhere"}):
             with self.assertRaisesRegex(windsplat.MovieFailed, "ffmpeg.*not found.*apng"):
-                self.view.movie(self.folder / "a.webm")
+                self.view.movie(self.folder / "a.webm", workers=2)
         with unittest.mock.patch("shutil.which", lambda _: self.encoder("ffmpeg-fail")):
             with self.assertRaisesRegex(windsplat.MovieFailed, "no such codec"):
-                self.view.movie(self.folder / "a.mp4", steps=[0])
+                self.view.movie(self.folder / "a.mp4", steps=[0], workers=2)
         with self.assertRaisesRegex(windsplat.MovieFailed, "frame 1 has 64 x 40"):
             windsplat.movie(self.folder / "a.zip", [self.view, self.view.size(64, 40)])
         with self.assertRaises(windsplat.InvalidView):
