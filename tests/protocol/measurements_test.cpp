@@ -191,8 +191,8 @@ TEST(Measurements, JobsHaveTheirShape) {
   EXPECT_EQ(Json::parse(encode_job(job))["problem"]["status"], 422);
   job.problem.reset();
   job.kind = "reference";
-  job.result = AnimationDescription{
-      "b2", "/v1/animations/b2.mp4", "mp4", 640, 480, 90, 24, 12345, "2026-01-01T14:00:00Z"};
+  job.result = AnimationDescription{"b2",  "/v1/animations/b2.mp4", "mp4", 640, 480, 90, 24,
+                                    12345, "2026-01-01T14:00:00Z"};
   expect_shape("job", encode_job(job));
   EXPECT_EQ(Json::parse(encode_job(job))["result"]["movie"], "/v1/animations/b2.mp4");
   job.result = ReferenceDescription{"a1", "/v1/references/a1.png", 640, 480, 2e-4, 0.01, 74};
