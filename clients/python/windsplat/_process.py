@@ -88,10 +88,7 @@ def _guard_of(process: subprocess.Popen[str]) -> subprocess.Popen[bytes] | None:
     return guard
 
 
-def _end(process: subprocess.Popen[str], guard: subprocess.Popen[bytes] | None,
-         owner: int) -> None:
-    if os.getpid() != owner:  # a fork of the process that started it, as of multiprocessing
-        return
+def _end(process: subprocess.Popen[str], guard: subprocess.Popen[bytes] | None) -> None:
     if guard is not None:  # first, so that it never signals a process of another number
         guard.kill()
         guard.wait()
@@ -129,8 +126,7 @@ class Process:
         )
         self._process = process
         self._lines: collections.deque[str] = collections.deque(maxlen=LOG_LINES)
-        self._finalizer = weakref.finalize(self, _end, process, _guard_of(process),
-                                           os.getpid())
+        self._finalizer = weakref.finalize(self, _end, process, _guard_of(process))
         urls: queue.Queue[str | None] = queue.Queue()
         lines = self._lines
 

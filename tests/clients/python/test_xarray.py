@@ -3,6 +3,7 @@ import tempfile
 import unittest
 import unittest.mock
 
+import netCDF4
 import numpy as np
 import support
 import xarray
@@ -182,11 +183,13 @@ class Accessors(unittest.TestCase):
         return dataset.values(name, step=step).array
 
     def test_numbers_of_every_kind_arrive(self):
-        for dtype in ("f2", "f4", "f8", "g", ">f4", "i1", "i2", "u2", "i8", "u8", "?"):
-            with self.subTest(dtype):
-                arrays = cube(dtype)
-                np.testing.assert_array_equal(self.values(arrays),
-                                              arrays.a[1].values.astype("f4"))
+        kinds = {f"k{number}": cube(dtype).a for number, dtype in enumerate(
+            ("f2", "f4", "f8", "g", ">f4", "i1", "i2", "u2", "i8", "u8", "?"))}
+        dataset = xarray.Dataset(kinds).windsplat.open(server=self.server)
+        for name, array in kinds.items():
+            with self.subTest(array.dtype):
+                np.testing.assert_array_equal(dataset.values(name, step=1).array,
+                                              array[1].values.astype("f4"))
 
     def test_packed_and_missing_values_are_those_of_the_attributes(self):
         packed = cube("i2", scale_factor=0.5, add_offset=10.0, _FillValue=np.int16(3))
@@ -221,8 +224,10 @@ class Accessors(unittest.TestCase):
         arrays = arrays.assign_coords(
             lat=(("y", "x"), lat + 0.01 * lon, {"units": "degrees_north"}),
             lon=(("y", "x"), lon - 0.01 * lat, {"units": "degrees_east"}))
-        probe = arrays.windsplat.open(server=self.server).probe(lon=8, lat=42, level=1)
-        self.assertEqual(probe.position.index[:2], (3, 2))
+        dataset = arrays.windsplat.open(server=self.server)
+        self.assertEqual(dataset.probe(lon=8, lat=42, level=1).position.index[:2], (3, 2))
+        with netCDF4.Dataset(self.server._root / f"{dataset.id}.nc") as file:
+            self.assertEqual(set(file["a"].coordinates.split()), {"lat", "lon"})
 
     def test_lazy_arrays_are_read_an_entry_at_a_time_and_not_kept(self):
         arrays, source = lazy(cube("f8"), "a")
