@@ -127,7 +127,8 @@ class Accessor:
         self._opened.clear()
 
     def view(
-        self, u: Any = None, v: Any = None, w: Any = None, scalar: Any = None, *, server: Server | None = None,
+        self, u: Any = None, v: Any = None, w: Any = None, scalar: Any = None,
+        *, server: Server | None = None,
         title: str | None = None, size: tuple[int, int] | None = None, step: int | None = None,
         **keys: Any,
     ) -> View:
