@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Client } from "../src/client/client";
 import { ViewStream, type StreamEvents, type StreamOptions } from "../src/client/view_stream";
-import type { Dataset, View } from "../src/wire/protocol";
+import type { Dataset, FrameHeader, View } from "../src/wire/protocol";
 import { problemText, type ProblemError } from "../src/wire/requests";
 
 type Sent = Record<string, unknown> & { type: string; rev: number };
@@ -324,4 +324,56 @@ test("the text of a problem has all of its entries, else its detail or title", (
   assert.equal(problemText({ ...problem, errors }), "/a: wrong; /b/0: too large");
   assert.equal(problemText(problem), "/a: wrong");
   assert.equal(problemText({ ...problem, detail: "" }), "Unprocessable");
+});
+
+test("an opener of the caller's own decides on datasets, views and refusals", () => {
+  const told: string[] = [];
+  open({ dataset: "a" });
+  const before = Socket.last;
+  const { stream, socket } = open(
+    {},
+    {},
+    {
+      opener: {
+        begin: ({ datasets }) => {
+          const dataset = datasets.at(-1)!.id;
+          stream.transmit([stream.model.state.change({ dataset })]);
+        },
+        replace: ({ dataset }) => void told.push(`replace ${dataset}`),
+        opened: ({ id }) => void told.push(`opened ${id}`),
+        refused: ({ rev }) => stream.withdraw(rev!),
+      },
+    },
+  );
+  assert.equal(socket, before, "nothing is connected before start()");
+  stream.setHidden(true);
+  stream.connection.start();
+  const own = Socket.last;
+  own.hello("a", "b");
+  assert.deepEqual(
+    own.sent.map(({ type }) => type),
+    ["visibility", "patch"],
+    "a hidden session draws nothing",
+  );
+  assert.deepEqual(own.sent[1]!.patch, { dataset: "b" });
+  own.says({ type: "opened", id: 7, dataset });
+  stream.replace({ dataset: "a" });
+  stream.change({ step: 2 });
+  const problem = { type: "about:blank", title: "no", status: 400, detail: "no", errors: [] };
+  own.says({ type: "error", rev: own.rev, problem });
+  assert.deepEqual(stream.explicit, { dataset: "b" });
+  assert.equal(stream.isAfterRefusal(own.rev), false);
+  assert.deepEqual(told, ["opened 7", "replace a"]);
+});
+
+test("during playback the step of an older view is followed if the caller says so", () => {
+  const { stream, socket } = open({ dataset: "a" }, {}, { acknowledge: "manual" });
+  socket.hello("a");
+  const { rev } = socket;
+  stream.change({ scalars: [] });
+  const header = { seq: 1, rev, step: 2, final: false } as FrameHeader;
+  stream.show(header);
+  assert.equal(stream.explicit.step, undefined);
+  stream.show({ ...header, seq: 2 }, true);
+  assert.equal(stream.explicit.step, 2);
 });

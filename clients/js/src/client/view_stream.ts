@@ -10,19 +10,17 @@ import type {
   ChosenMessage,
   ClientMessage,
   Dataset,
-  ErrorMessage,
   Frame,
   FrameHeader,
   HelloMessage,
-  OpenedMessage,
   ProgressMessage,
-  Problem,
   ServerMessage,
   StatsMessage,
   View,
 } from "../wire/protocol";
 import type { Reach } from "../wire/reach";
-import { problemText, ProblemError } from "../wire/requests";
+import { ProblemError } from "../wire/requests";
+import { PlainOpener, type Opener } from "./opener";
 
 export interface StreamEvents {
   /**
@@ -52,6 +50,8 @@ export interface StreamOptions extends LinkOptions {
    */
   acknowledge?: "auto" | "manual";
   clock?: Clock;
+  /** Chooses the dataset instead of the plain opener; the stream begins at connection.start(). */
+  opener?: Opener;
 }
 
 const systemClock: Clock = {
@@ -71,11 +71,8 @@ export class ViewStream {
   readonly model = new ViewModel();
   private readonly answers = new PatchAnswers(this.model.state);
   private readonly auto: boolean;
-  private wanted: View; // stated again after a restart, also if it was refused
-  private opening: string | undefined; // the dataset of the last `open` of this session
-  private opens = 1; // number of the last `open`, which its answer repeats
-  private plainRev = 0; // rev of the last view without the keys of a refused one
-  private refusedOpen = ""; // detail of the last refusal, which the answer to `open` repeats
+  private readonly opener: Opener;
+  private asked: View; // stated again after a restart, also if it was refused
   private last: Frame | null = null;
   private answered = 0; // rev of the newest view that the last frame shows
   private waiting: Waiting[] = [];
@@ -86,9 +83,10 @@ export class ViewStream {
     url: string,
     view: View,
     private readonly events: StreamEvents = {},
-    { acknowledge = "auto", clock = systemClock, ...link }: StreamOptions = {},
+    { acknowledge = "auto", clock = systemClock, opener, ...link }: StreamOptions = {},
   ) {
-    this.wanted = view;
+    this.asked = view;
+    this.opener = opener ?? this.plainOpener();
     this.auto = acknowledge === "auto";
     this.model.state.change(view as Patch);
     this.connection = openConnection(
@@ -103,7 +101,18 @@ export class ViewStream {
       },
       link,
     );
-    this.connection.start();
+    if (opener === undefined) this.connection.start();
+  }
+
+  private plainOpener(): Opener {
+    return new PlainOpener(this, {
+      opened: (dataset) => this.events.opened?.(dataset),
+      refused: (error) => {
+        this.fail(error);
+        this.events.refused?.(error);
+      },
+      reverted: () => this.events.changed?.(this.explicit),
+    });
   }
 
   // --- the view --------------------------------------------------------------------------
@@ -128,11 +137,16 @@ export class ViewStream {
     return this.model.camera();
   }
 
+  /** As it was asked for last, also if it was refused since. */
+  get wanted(): View {
+    return this.asked;
+  }
+
   /** Changes the view by a merge patch (RFC 7396). */
   change(patch: Patch): void {
     this.connection.wake();
-    const outgoing = [this.model.state.change(patch)];
-    this.changed(outgoing);
+    this.transmit([this.model.state.change(patch)]);
+    this.changed();
   }
 
   /**
@@ -141,18 +155,20 @@ export class ViewStream {
    */
   replace(view: View): void {
     this.connection.wake();
-    const { dataset, image } = this.explicit;
-    const next = { ...view };
-    const named = view.dataset ?? dataset;
-    if (named !== undefined) next.dataset = named;
-    if (image?.width !== undefined && image.height !== undefined) {
-      next.image = { width: image.width, height: image.height, ...view.image };
-    }
-    if (named !== this.model.open?.id) this.model.open = null;
-    this.changed(this.model.state.replace(next));
-    if (named !== this.opening) this.open();
+    this.opener.replace(view);
+    this.changed();
   }
 
+  /** Sends changes that have been made to `model.state`. */
+  transmit(outgoing: Outgoing[]): void {
+    const t = performance.now();
+    for (const { rev, patch } of outgoing) this.send({ type: "patch", rev, t, patch });
+  }
+
+  /** The server refused this change: the view is again what it was without it. */
+  withdraw(rev: number): void {
+    this.answers.refuse(rev);
+  }
   /** Plays the time steps from `from` to `to`; the steps of the frames tell how far it is. */
   play(
     from: number,
@@ -184,15 +200,19 @@ export class ViewStream {
     this.send({ type: "ack", seq, decodeMs });
   }
 
-  /** A frame is shown. */
-  show(header: FrameHeader): void {
+  /**
+   * A frame is shown; returns how it was drawn, if that is known. playing: its step is followed
+   * also if a newer view has been asked for.
+   */
+  show(header: FrameHeader, playing = false): ChosenMessage | null {
     const chosen = this.answers.drawn(header);
     if (chosen !== null) this.model.drew(chosen, header.final);
     this.answered = Math.max(header.rev, this.answered);
-    this.followStep(header);
+    if (playing || this.isNewest(header.rev)) this.followStep(header.step);
     this.settleUnchanged();
     this.events.shown?.(header, chosen);
     if (this.last?.header.seq === header.seq) this.answerFinal();
+    return chosen;
   }
 
   /** Whether a frame or an answer of this rev is newer than the last refusal. */
@@ -224,41 +244,19 @@ export class ViewStream {
     this.events.state?.(state);
   }
 
-  // A new session has no state, so the whole view is sent.
   private onHello(hello: HelloMessage): void {
-    const { state } = this.model;
     this.answers.newSession();
     this.last = null;
     this.answered = 0;
-    this.opening = undefined;
-    if (state.document.dataset === undefined) {
-      const dataset = this.wanted.dataset ?? hello.datasets[0]?.id;
-      if (dataset !== undefined) state.change({ ...this.wanted, dataset });
-    }
     if (this.hidden) this.send({ type: "visibility", hidden: true });
-    if (state.document.dataset === undefined) {
-      this.refuse(new ProblemError("the server has no dataset", 404));
-    } else {
-      this.sendAll([state.restate()]);
-      this.open();
-    }
+    this.opener.begin(hello);
     this.events.hello?.(hello);
-  }
-
-  // The view is sent before, so that the first picture already shows it; `open` then only asks for
-  // the dataset's description.
-  private open(): void {
-    const { dataset } = this.explicit;
-    if (dataset === undefined) return;
-    this.opens += 1;
-    const sent = this.send({ type: "open", id: this.opens, dataset });
-    this.opening = sent ? dataset : undefined;
   }
 
   private onMessage(message: ServerMessage): void {
     switch (message.type) {
       case "opened":
-        this.onOpened(message);
+        this.opener.opened(message);
         break;
       case "chosen":
         this.answers.onChosen(message);
@@ -269,7 +267,7 @@ export class ViewStream {
         this.answerFinal();
         break;
       case "error":
-        this.onError(message);
+        this.opener.refused(message);
         break;
       case "progress":
         this.events.progress?.(message);
@@ -280,14 +278,6 @@ export class ViewStream {
       case "hello": // taken by the connection
         break;
     }
-  }
-
-  private onOpened({ id, dataset }: OpenedMessage): void {
-    if (id !== this.opens || dataset.id !== this.explicit.dataset) return;
-    const again = this.model.open?.id === dataset.id;
-    this.model.open = dataset;
-    if (again) this.model.fitDrawn(dataset);
-    this.events.opened?.(dataset);
   }
 
   private onFrame(frame: Frame): void {
@@ -303,40 +293,6 @@ export class ViewStream {
         this.acknowledge(frame.header.seq, performance.now() - began);
         this.show(frame.header);
       });
-  }
-
-  // Both the view with an unknown dataset and the `open` of it are refused; one is told.
-  private onError({ id, rev, problem }: ErrorMessage): void {
-    if (rev === undefined && id !== undefined && id !== this.opens) return; // of an earlier `open`
-    if (id === this.opens) this.opening = undefined;
-    const repeated = id === this.opens && problem.detail === this.refusedOpen;
-    this.refusedOpen = problem.detail;
-    const error = problemError(problem);
-    if (rev !== undefined) this.withdraw(rev, error);
-    if (!repeated) this.refuse(error);
-    if (rev !== undefined) this.events.changed?.(this.explicit); // back to the view before
-  }
-
-  // If the first view of a session is refused, nothing is left to go back to: its dataset is shown
-  // by default, so that what is drawn and described belongs to the view.
-  private withdraw(rev: number, error: ProblemError): void {
-    const { dataset, image } = this.explicit;
-    this.answers.refuse(rev);
-    const left = this.explicit.dataset !== undefined || dataset === undefined;
-    if (left || rev === this.plainRev || isOfDataset(error)) return;
-    const { width, height } = image ?? {};
-    const sized = width !== undefined && height !== undefined && !names(error, "/image");
-    const plain = this.model.state.change({
-      dataset,
-      ...(sized ? { image: { width, height } } : {}),
-    });
-    this.plainRev = plain.rev;
-    this.sendAll([plain]);
-  }
-
-  private refuse(error: ProblemError): void {
-    this.fail(error);
-    this.events.refused?.(error);
   }
 
   // --- answers ---------------------------------------------------------------------------
@@ -364,31 +320,15 @@ export class ViewStream {
   }
 
   // Playback changes the step; nothing is sent back.
-  private followStep({ rev, step }: FrameHeader): void {
+  private followStep(step: number): void {
     const { state } = this.model;
-    if (!this.isNewest(rev) || step === (state.document.step ?? 0)) return;
+    if (step === (state.document.step ?? 0)) return;
     state.follow(step);
     this.events.changed?.(this.explicit);
   }
 
-  private changed(outgoing: Outgoing[]): void {
-    this.wanted = this.explicit;
-    this.sendAll(outgoing);
+  private changed(): void {
+    this.asked = this.explicit;
     this.events.changed?.(this.explicit);
   }
-
-  private sendAll(outgoing: Outgoing[]): void {
-    const t = performance.now();
-    for (const { rev, patch } of outgoing) this.send({ type: "patch", rev, t, patch });
-  }
 }
-
-const names = ({ problem }: ProblemError, place: string): boolean =>
-  problem?.errors?.some(({ pointer }) => pointer.startsWith(place)) ?? false;
-
-/** Whether a dataset is refused, not what a view says of it. */
-export const isOfDataset = (error: ProblemError): boolean =>
-  error.status === 404 || names(error, "/dataset");
-
-const problemError = (problem: Problem): ProblemError =>
-  new ProblemError(problemText(problem), problem.status, problem);

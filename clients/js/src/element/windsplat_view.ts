@@ -1,6 +1,6 @@
 // <windsplat-view src="https://your.host/" dataset="winds">: a live picture of a view in any page.
 import { Client } from "../client/client";
-import { isOfDataset } from "../client/view_stream";
+import { isOfDataset } from "../client/opener";
 import { failureText, ProblemError } from "../wire/requests";
 import type { Camera } from "../view/camera";
 import { zoom } from "../view/camera";

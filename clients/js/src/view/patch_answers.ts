@@ -10,7 +10,6 @@ export class PatchAnswers {
   private shownSeq = 0; // seq of the frame on the canvas
   private unchanged: UnchangedMessage | null = null; // its frame is not shown yet
   private refusedRev = 0; // rev of the newest refused patch
-  private answeredT = 0; // t of the newest patch answered by a frame
 
   constructor(private readonly state: ViewState) {}
 
@@ -45,13 +44,6 @@ export class PatchAnswers {
     const chosen = this.chosen.get(seq) ?? null;
     this.chosen.delete(seq);
     return chosen;
-  }
-
-  // Whether this frame is the first answer to its patch; later frames do not measure the latency.
-  isFirst({ t }: FrameHeader): boolean {
-    const first = t > 0 && t !== this.answeredT;
-    this.answeredT = t;
-    return first;
   }
 
   onUnchanged(message: UnchangedMessage): void {
