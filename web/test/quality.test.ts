@@ -67,7 +67,7 @@ test("the server is notified when the page is hidden or shown", () => {
   assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: false });
 });
 
-test("a new session is sent the whole view in one patch, and the page's visibility", () => {
+test("a new session is sent the whole view in one patch", () => {
   const page = shown();
   page.app.change({ camera: { fovY: 50 }, quality: { maxError: 0.003 } });
   page.app.change({ vector: { length: 0.2 } });
@@ -78,7 +78,14 @@ test("a new session is sent the whole view in one patch, and the page's visibili
   assert.equal(dataset, "storm");
   assert.deepEqual([camera, quality, vector], [{ fovY: 50 }, { maxError: 0.003 }, { length: 0.2 }]);
   assert.equal(page.sent("open").length, 1);
-  assert.deepEqual(page.sent("visibility"), [{ type: "visibility", hidden: false }]);
+  assert.deepEqual(page.sent("visibility"), [], "sessions are visible by default");
+});
+
+test("a new session is told that the page is hidden", () => {
+  const page = shown();
+  page.hide(true);
+  page.again();
+  assert.deepEqual(page.sent("visibility"), [{ type: "visibility", hidden: true }]);
 });
 
 test("a camera patch waits for earlier unsent patches", () => {

@@ -4,17 +4,14 @@
 import { Address } from "./address";
 import type { AppParts } from "./app_parts";
 import {
-  PatchAnswers,
   CameraControl,
   ColorMaps,
   type Clock,
-  type Connection,
   type ConnectionState,
   type FrameState,
-  openConnection,
   watchPresence,
   type VideoOffer,
-  ViewModel,
+  type ViewModel,
   type Outgoing,
   type Patch,
   type DrawnFrame,
@@ -24,8 +21,9 @@ import {
   type Dataset,
   type ErrorMessage,
   type HelloMessage,
-  type ServerMessage,
+  type ProgressMessage,
   type View,
+  ViewStream,
 } from "@windsplat/client";
 import { Flow } from "../view/flow";
 import { scaleText } from "../viewport/frame_text";
@@ -48,9 +46,8 @@ export class App {
   readonly playback: Playback;
   readonly undoControl: UndoControl;
   readonly video: VideoOffer;
-  private readonly model = new ViewModel();
-  private readonly answers = new PatchAnswers(this.model.state);
-  private readonly connection: Connection;
+  private readonly stream: ViewStream;
+  private readonly model: ViewModel;
   private readonly flowing: Flow;
   private parts!: AppParts;
   private opener!: DatasetOpener;
@@ -61,22 +58,15 @@ export class App {
     private readonly baseUri: string,
   ) {
     this.api = new Api(baseUri, (url, init) => fetch(url, init));
+    this.stream = this.makeStream();
+    this.model = this.stream.model;
     this.cameras = new CameraControl(this.model, {
       change: (patch) => this.change(patch),
       size: () => this.parts.viewport.size(),
-      ready: () => this.connection.ready,
-    });
-    this.connection = openConnection(baseUri, clock, {
-      state: (state) => this.onState(state),
-      hello: (hello) => this.onHello(hello),
-      message: (message) => this.onMessage(message),
-      frame: (frame) => {
-        // A frame that cannot be shown must still return its credit to the server.
-        this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
-      },
+      ready: () => this.stream.connection.ready,
     });
     this.video = offerVideo(clock, {
-      send: (message) => void this.connection.send(message),
+      send: (message) => void this.stream.send(message),
       note: (text) => this.parts.status.note(text),
     });
     this.undoControl = new UndoControl({
@@ -90,7 +80,7 @@ export class App {
       announce: (text) => this.parts.status.note(text),
     });
     this.playback = new Playback({
-      send: (message) => this.connection.send(message),
+      send: (message) => this.stream.send(message),
       settings: () => this.parts.timeBar,
       seek: (step) => this.seek(step),
       changed: () => {
@@ -107,7 +97,7 @@ export class App {
       time: () => this.view().vector?.motion?.time ?? 0,
       send: (time) => {
         const outgoing = this.model.state.change({ vector: { motion: { time } } });
-        this.send(outgoing);
+        this.send([outgoing]);
         return outgoing.rev;
       },
       ended: () => {
@@ -115,6 +105,34 @@ export class App {
         this.refresh();
       },
     });
+  }
+
+  private makeStream(): ViewStream {
+    return new ViewStream(
+      this.baseUri,
+      {},
+      {
+        frame: (frame) => {
+          // A frame that cannot be shown must still return its credit to the server.
+          this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
+        },
+        state: (state) => this.onState(state),
+        settled: (rev) => this.onSettled(rev),
+        changed: () => this.address.save(),
+        progress: (message) => this.onProgress(message),
+        stats: (message) => this.parts.hud.steps(message),
+      },
+      {
+        acknowledge: "manual",
+        clock: this.clock,
+        opener: {
+          begin: (hello) => this.onHello(hello),
+          replace: (view) => this.turnTo(view),
+          opened: (message) => this.opener.onOpened(message),
+          refused: (message) => this.onError(message),
+        },
+      },
+    );
   }
 
   start(parts: AppParts): void {
@@ -134,16 +152,17 @@ export class App {
     this.loadMaps();
     this.address.first((view) => {
       this.model.state.change(this.firstView(view ?? {}) as Patch);
-      this.connection.start();
+      this.stream.connection.start();
     });
-    watchPresence(this.connection, () => this.sendVisibility());
+    this.tellVisibility();
+    watchPresence(this.stream.connection, () => this.tellVisibility());
   }
 
   private makeOpener({ status, list, cards, entries }: AppParts): DatasetOpener {
     return new DatasetOpener(
       {
-        sendMessage: (message) => void this.connection.send(message),
-        send: (outgoing) => outgoing.forEach((one) => this.send(one)),
+        sendMessage: (message) => void this.stream.send(message),
+        send: (outgoing) => this.send(outgoing),
         firstView: (explicit) => this.firstView(explicit),
         halt: () => {
           this.playback.halt();
@@ -195,8 +214,7 @@ export class App {
   }
 
   change(patch: Patch): void {
-    this.connection.wake();
-    this.undoControl.edit(() => this.send(this.model.state.change(patch)));
+    this.undoControl.edit(() => this.stream.change(patch));
     this.refresh();
   }
 
@@ -215,7 +233,7 @@ export class App {
   }
 
   connectNow(): void {
-    this.connection.retryNow();
+    this.stream.connection.retryNow();
   }
 
   resetAll(): void {
@@ -272,6 +290,10 @@ export class App {
 
   // Replaces the current view with another one.
   restore(view: View): void {
+    this.stream.replace(view);
+  }
+
+  private turnTo(view: View): void {
     this.parts.status.clearError();
     const next = this.firstView(view);
     if (!this.opener.follow(next)) this.replace({ ...next, dataset: this.model.open?.id });
@@ -289,14 +311,14 @@ export class App {
     return vector?.field !== null && vector?.motion?.mode === "phase";
   }
 
-  private send({ rev, patch }: Outgoing): void {
-    this.connection.send({ type: "patch", rev, t: performance.now(), patch });
+  private send(outgoing: Outgoing[]): void {
+    this.stream.transmit(outgoing);
     this.address.save();
   }
 
   private replace(view: View): void {
     this.flowing.stop();
-    for (const outgoing of this.model.state.replace(view)) this.send(outgoing);
+    this.send(this.model.state.replace(view));
     this.refresh();
   }
 
@@ -312,35 +334,13 @@ export class App {
   private onHello(hello: HelloMessage): void {
     this.parts.entries.refuse(""); // another server may allow it
     this.parts.viewport.newSession(hello.limits.imagePixelsMax);
-    this.answers.newSession();
     this.video.greet();
     if (!this.maps.loaded) this.loadMaps();
-    if (this.opener.begin(hello.datasets)) this.sendVisibility();
+    this.opener.begin(hello.datasets);
   }
 
-  private onMessage(message: ServerMessage): void {
-    switch (message.type) {
-      case "opened":
-        this.opener.onOpened(message);
-        break;
-      case "progress":
-        if (!this.opener.awaits(message.id)) break;
-        this.parts.status.progress(message.phase, message.done, message.etaMs);
-        break;
-      case "chosen":
-        this.answers.onChosen(message);
-        break;
-      case "unchanged":
-        this.answers.onUnchanged(message);
-        this.settleUnchanged();
-        break;
-      case "stats":
-        this.parts.hud.steps(message);
-        break;
-      case "error":
-        this.onError(message);
-        break;
-    }
+  private onProgress({ id, phase, done, etaMs }: ProgressMessage): void {
+    if (this.opener.awaits(id)) this.parts.status.progress(phase, done, etaMs);
   }
 
   private onOpened(anew: boolean, changed: boolean): void {
@@ -363,7 +363,7 @@ export class App {
     if (this.opener.onError(message, text)) return;
     if (message.rev !== undefined) {
       status.error("view", text);
-      this.answers.refuse(message.rev);
+      this.stream.withdraw(message.rev);
       this.flowing.refused(message.rev);
       this.opener.onRefused(message.rev);
       this.refresh();
@@ -378,37 +378,31 @@ export class App {
     const { header } = frame;
     const { hud, status, viewport } = this.parts;
     if (!this.opener.waiting) status.loaded(); // the data that the view was waiting for
-    const chosen = this.answers.drawn(header);
+    const before = this.view().step ?? 0;
+    const chosen = this.stream.show(header, this.playback.running);
+    this.playback.shown(header.step, before);
     this.flowing.answered(header.rev);
-    if (chosen !== null) {
-      this.model.drew(chosen, header.final);
-      status.empty(chosen.empty, nightText(chosen.view as View));
-    }
-    // The server's step is adopted if no newer view was requested or playback is running.
-    if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
+    if (chosen !== null) status.empty(chosen.empty, nightText(chosen.view as View));
     hud.show(frame, chosen, viewport.canvas.width);
     status.clearError("frame");
-    if (this.answers.isAfterRefusal(header.rev)) status.clearError("view");
-    this.settleUnchanged();
-    if (this.answers.isFirst(header)) status.responded(frame.drawnAt - header.t);
+    if (this.stream.isAfterRefusal(header.rev)) status.clearError("view");
+    status.responded(frame);
     document.documentElement.classList.add("has-picture");
     this.refresh();
     this.showLegend();
   }
 
-  private settleUnchanged(): void {
-    const rev = this.answers.settleUnchanged();
-    if (rev === null) return;
+  private onSettled(rev: number): void {
     const { canvas } = this.parts.viewport;
     this.flowing.answered(rev);
     canvas.dataset.rev = String(Math.max(rev, Number(canvas.dataset.rev)));
-    if (this.answers.isAfterRefusal(rev)) this.parts.status.clearError("view");
+    if (this.stream.isAfterRefusal(rev)) this.parts.status.clearError("view");
     this.refresh();
   }
 
   // Sent as soon as the frame is decoded, shown or not, so that the server may send another one.
   acknowledge(seq: number, decodeMs: number): void {
-    this.connection.send({ type: "ack", seq, decodeMs });
+    this.stream.acknowledge(seq, decodeMs);
   }
 
   onBroken(seq: number): void {
@@ -427,13 +421,6 @@ export class App {
     facts.textContent = `${dims.x} × ${dims.y} × ${dims.z} · ${stepsText}`;
     facts.title = `${title} — ${source} (${format})`;
     document.title = `${title} · windsplat`;
-  }
-
-  private followStep(step: number): void {
-    const before = this.view().step ?? 0;
-    const { state } = this.model;
-    if (step !== state.document.step) state.follow(step);
-    this.playback.shown(step, before);
   }
 
   private refresh(): void {
@@ -459,7 +446,7 @@ export class App {
     const rests = dataset.rev === dataset.wanted && !this.playback.running;
     const state = rests ? (dataset.state as FrameState | undefined) : undefined;
     const scale = scaleText(Number(dataset.width ?? canvas.width), canvas.width);
-    if (dataset.seq !== undefined && !this.connection.live) {
+    if (dataset.seq !== undefined && !this.stream.connection.live) {
       this.parts.hud.mark("offline", "");
       return;
     }
@@ -490,11 +477,8 @@ export class App {
     );
   }
 
-  private sendVisibility(): void {
-    if (!document.hidden) {
-      this.connection.wake();
-      this.flowing.seen();
-    }
-    this.connection.send({ type: "visibility", hidden: document.hidden });
+  private tellVisibility(): void {
+    this.stream.setHidden(document.hidden);
+    if (!document.hidden) this.flowing.seen();
   }
 }

@@ -158,7 +158,7 @@ export class DatasetOpener {
   }
 
   // A new session has no state, so the dataset and the whole view are sent.
-  begin(datasets: DatasetSummary[]): boolean {
+  begin(datasets: DatasetSummary[]): void {
     const { model, list } = this;
     list.set(datasets);
     // A restarted server may no longer have the displayed dataset.
@@ -170,17 +170,16 @@ export class DatasetOpener {
     if (id === undefined) {
       this.status.announce("live, without a dataset");
       this.host.empty();
-      return false;
+      return;
     }
     const entry = list.has(id) ? null : entryOf(id, datasets);
     if (entry !== null) {
       this.openEntry(entry, () => model.state.document, true);
-      return true;
+      return;
     }
     // The limits of the server and the size of the window may have changed.
     model.state.change(this.host.firstView({ dataset: id }) as Patch);
     this.request(id, [model.state.restate()]);
-    return true;
   }
 
   // The server also sends `opened` unsolicited when the files of the displayed dataset change.

@@ -1,6 +1,6 @@
 // Status text: connection, loading with a progress bar, and errors. An error is shown until it is
 // dismissed or the failed operation succeeds; less important messages never overwrite it.
-import type { ConnectionState } from "@windsplat/client/parts";
+import type { ConnectionState, DrawnFrame } from "@windsplat/client/parts";
 import { countedFromOne } from "../base/step_text";
 import { byId } from "../base/dom";
 
@@ -17,6 +17,7 @@ export class Status {
   private readonly bar = byId("loading-bar", HTMLProgressElement);
   private readonly loadingText = byId("loading-text", HTMLElement);
   private alertTopic = "";
+  private answeredT = 0; // t of the newest patch answered by a frame
   private barTimer: number | undefined;
   private noteTimer: number | undefined;
   private noted: string | null = null; // the text that a note has temporarily replaced
@@ -88,8 +89,10 @@ export class Status {
     }
   }
 
-  responded(ms: number): void {
-    this.latency.textContent = `${ms.toFixed(0)} ms`;
+  // Only the first frame that answers a patch measures the latency.
+  responded({ header: { t }, drawnAt }: Pick<DrawnFrame, "header" | "drawnAt">): void {
+    if (t > 0 && t !== this.answeredT) this.latency.textContent = `${(drawnAt - t).toFixed(0)} ms`;
+    this.answeredT = t;
   }
 
   // `topic` names the operation whose success clears the error.
