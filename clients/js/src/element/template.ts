@@ -3,13 +3,15 @@
 
 const css = `
 :host { display: block; position: relative; aspect-ratio: 8 / 5; overflow: hidden;
-  background: #0b0e14; color: #e8ecf2; font: 13px/1.4 system-ui, sans-serif; }
+  background: #0b0e14; color: #e8ecf2; font: 13px/1.4 system-ui, sans-serif;
+  touch-action: pan-y; }
+:host([interactive="false"]) { touch-action: auto; }
 :host([hidden]) { display: none; }
 .frame { display: grid; height: 100%; grid-template: minmax(0, 1fr) auto / minmax(0, 1fr); }
-canvas { display: block; grid-area: 1 / 1; width: 100%; height: 100%; touch-action: none;
-  cursor: grab; outline: none; }
+canvas { display: block; grid-area: 1 / 1; width: 100%; height: 100%;
+  touch-action: inherit; cursor: grab; outline: none; }
 canvas.dragging { cursor: grabbing; }
-:host([interactive="false"]) canvas { touch-action: auto; cursor: default; }
+:host([interactive="false"]) canvas { cursor: default; }
 canvas:focus-visible { box-shadow: inset 0 0 0 2px #6cb2ff; }
 [part="message"] { position: absolute; inset: 0.6em 0.6em auto; margin: 0; padding: 0.4em 0.7em;
   width: fit-content; max-width: calc(100% - 2.6em); border-radius: 4px; background: #000b; }

@@ -28,7 +28,7 @@ const spokenKeys = `${spoken} Drag or use the arrow keys to rotate it.`;
 export class WindsplatView extends HTMLElement {
   static readonly observedAttributes: readonly string[] = observed;
 
-  private readonly inside = fill(this.attachShadow({ mode: "open" }));
+  private readonly inside = fill(this.attachShadow({ mode: "open", delegatesFocus: true }));
   private readonly bar: ControlBar;
   private readonly moves: MoveQueue;
   private readonly loading = new Loading(this.inside, (text) => this.sayFirst(text));
@@ -59,6 +59,7 @@ export class WindsplatView extends HTMLElement {
       takesWheel: ({ ctrlKey }) =>
         this.interactive && (ctrlKey || this.shadowRoot?.activeElement === canvas),
       active: () => this.interactive,
+      fingerScrolls: true,
     });
     canvas.addEventListener("keydown", (event) => this.onKey(event));
     this.bar = new ControlBar(this.inside, {

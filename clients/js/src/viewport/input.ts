@@ -81,6 +81,7 @@ export interface PointerHost {
   clicked(x: number, y: number, event: PointerEvent): void;
   takesWheel(event: WheelEvent): boolean; // false: it scrolls what is around the element
   active?(): boolean; // false: pointers are left alone
+  fingerScrolls?: boolean; // one finger may scroll the page instead (CSS touch-action)
 }
 
 // One finger or the left button orbits; two fingers, another button or shift pan; two fingers also
@@ -90,6 +91,7 @@ export class PointerInput {
   private panning = false;
   private travelled = 0; // greatest distance in pixels from the first contact
   private twisted = 0; // degrees not applied yet
+  private holds = false; // the first move of a finger may turn out to scroll the page
   private twisting = false; // rolling has begun since a finger was added or lifted
 
   constructor(
@@ -117,8 +119,10 @@ export class PointerInput {
     if (this.fingers.size === 0) {
       this.panning = event.button !== 0 || event.shiftKey;
       this.travelled = 0;
+      this.holds = event.pointerType === "touch" && this.host.fingerScrolls === true;
     } else {
       this.travelled = Infinity;
+      this.holds = false;
     }
     this.element.setPointerCapture(event.pointerId);
     this.holdRoll();
@@ -154,6 +158,12 @@ export class PointerInput {
   private move(event: PointerEvent): void {
     const finger = this.fingers.get(event.pointerId);
     if (finger === undefined) return;
+    if (this.holds) {
+      // A browser that scrolls cancels the pointer before the next move, which counts from here.
+      this.travelled = Math.hypot(event.clientX - finger.x, event.clientY - finger.y);
+      this.holds = this.travelled < clickPixels;
+      return;
+    }
     const old = [...this.fingers.values()].map((one) => ({ ...one }));
     const before = gesture(old);
     this.travelled += Math.hypot(event.clientX - finger.x, event.clientY - finger.y);
