@@ -9,9 +9,10 @@ declare global {
   interface HTMLElementTagNameMap {
     "windsplat-view": WindsplatView;
   }
-  interface HTMLElementEventMap extends WindsplatEvents {}
+  interface GlobalEventHandlersEventMap extends WindsplatEvents {} // they bubble
 }
 
-if (customElements.get("windsplat-view") === undefined) {
-  customElements.define("windsplat-view", WindsplatView);
+// Servers that render pages have no registry.
+if (globalThis.customElements?.get("windsplat-view") === undefined) {
+  globalThis.customElements?.define("windsplat-view", WindsplatView);
 }

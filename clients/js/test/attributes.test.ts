@@ -43,3 +43,11 @@ test("keys move the camera; others do nothing", () => {
   );
   assert.equal(press("x"), undefined);
 });
+
+test("a view is copied, so that its owner may change it later", () => {
+  const view = { dataset: "a", camera: { fovY: 30 } };
+  const taken = viewOf(view);
+  view.camera.fovY = 50;
+  assert.equal(taken.camera?.fovY, 30);
+  assert.throws(() => viewOf(undefined), /must be an object/);
+});

@@ -83,10 +83,11 @@ test("the package holds modules, types, a README and the licence, and nothing el
   assert.equal(told.version, /project\(windsplat VERSION ([\d.]+)/.exec(cmake)[1]);
 });
 
-test("its types are those of the schemas, by Node's rules of resolution", () => {
-  const code = `import { Client, type View, ProblemError } from "@windsplat/client";
-import type { WindsplatView } from "@windsplat/client/element";
+const typed = `import { Client, type View, ProblemError } from "@windsplat/client";
+import type { WindsplatProperties, WindsplatView } from "@windsplat/client/element";
+import "@windsplat/client/windsplat-view.min.js";
 import { Viewport } from "@windsplat/client/parts";
+import data from "@windsplat/client/package.json" with { type: "json" };
 const view: View = { dataset: "a", vector: { stride: 2 } };
 // @ts-expect-error a stride is a number
 const wrong: View = { vector: { stride: "2" } };
@@ -96,18 +97,46 @@ export const times = async (): Promise<string[]> =>
   (await server.describe("a")).steps.times.map(({ text }) => text);
 export const picked = (element: WindsplatView): void =>
   element.addEventListener("windsplat-pick", ({ detail }) => detail.feature?.position.x.toFixed());
+document.addEventListener("windsplat-error", ({ detail }) => detail.message.trim());
+document.createElement("windsplat-view").view = view;
+export const jsx: WindsplatProperties = {
+  view,
+  pick: true,
+  "onwindsplat-frame": ({ detail }) => void detail.header.seq,
+};
+// @ts-expect-error a step is a number
+jsx.step = "1";
 server.stream(view, { frame: ({ header }) => void header.final });
-export { wrong, Viewport };
+export { data, wrong, Viewport };
 `;
-  writeFileSync(join(folder, "user.mts"), code);
-  const compiler = join(root, "web/node_modules/typescript/bin/tsc");
-  const rules = "--noEmit --strict --module nodenext --target es2022 --lib es2023,dom,dom.iterable";
-  const { status, stdout } = spawnSync(
-    process.execPath,
-    [compiler, ...rules.split(" "), "user.mts"],
-    { cwd: folder, encoding: "utf8" },
-  );
-  assert.equal(status, 0, stdout);
+
+for (const rules of [
+  "--module nodenext",
+  "--module node18",
+  "--module esnext --moduleResolution bundler",
+]) {
+  test(`its types are those of the schemas, with ${rules}`, () => {
+    writeFileSync(join(folder, "user.mts"), typed);
+    const compiler = join(root, "web/node_modules/typescript/bin/tsc");
+    const strict = "--noEmit --strict --exactOptionalPropertyTypes --resolveJsonModule";
+    const lib = "--target es2022 --lib es2023,dom,dom.iterable";
+    const { status, stdout } = spawnSync(
+      process.execPath,
+      [compiler, ...`${strict} ${lib} ${rules}`.split(" "), "user.mts"],
+      { cwd: folder, encoding: "utf8" },
+    );
+    assert.equal(status, 0, stdout);
+  });
+}
+
+test("servers that render pages may import all of it", async () => {
+  const told = run(`for (const part of ["", "/parts", "/element", "/windsplat-view.min.js"]) {
+  const names = Object.keys(await import("@windsplat/client" + part));
+  console.log(names.includes(part.includes("e") ? "WindsplatView" : part ? "Viewport" : "Client"));
+}
+console.log(globalThis.customElements, globalThis.window);
+`);
+  assert.equal(told, "true\ntrue\ntrue\ntrue\nundefined undefined\n");
 });
 
 test("the examples for programs run in Node as they are written", async () => {

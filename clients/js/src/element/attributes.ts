@@ -3,15 +3,15 @@ import { isObject } from "../base/values";
 import type { View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 
-// A view as an object or as JSON text. Throws an Error that says what it should have been.
+// A copy of a view, which is an object or JSON text. Throws an Error that says what it should have
+// been.
 export function viewOf(given: unknown): View {
-  let view = given;
-  if (typeof given === "string") {
-    try {
-      view = given.trim() === "" ? {} : JSON.parse(given);
-    } catch (error) {
-      throw new Error(`view is no JSON: ${(error as Error).message}`);
-    }
+  const text = typeof given === "string" ? given : (JSON.stringify(given) ?? "null");
+  let view: unknown;
+  try {
+    view = text.trim() === "" ? {} : JSON.parse(text);
+  } catch (error) {
+    throw new Error(`view is no JSON: ${(error as Error).message}`);
   }
   if (!isObject(view) || !isView(view)) {
     throw new Error('view must be an object such as {"dataset": "winds", "scalars": []}');

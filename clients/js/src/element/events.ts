@@ -41,3 +41,19 @@ export interface WindsplatEvents {
   "windsplat-error": CustomEvent<ErrorDetail>;
   "windsplat-pick": CustomEvent<PickDetail>;
 }
+
+/**
+ * What JSX may set on the element, for the declarations of frameworks
+ * (`JSX.IntrinsicElements`).
+ */
+export type WindsplatProperties = {
+  src?: string | undefined;
+  dataset?: string | undefined;
+  view?: View | string | undefined;
+  token?: string | undefined;
+  step?: number | undefined;
+  label?: string | undefined;
+  controls?: boolean | undefined;
+  interactive?: boolean | "true" | "false" | undefined;
+  pick?: boolean | undefined;
+} & { [K in keyof WindsplatEvents as `on${K}`]?: (event: WindsplatEvents[K]) => void };

@@ -19,14 +19,32 @@ import { Loading } from "./loading";
 import { fill } from "./template";
 
 const observed = ["src", "dataset", "view", "step", "label", "controls", "interactive"] as const;
-const properties = ["view", "token", "src", "dataset", "step", "label", "controls", "interactive"];
+const properties = [...observed, "token", "pick"];
+// Servers that render pages import the module too, and have no elements.
+const Base = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 const spoken = "A picture of a 3-D field, drawn on a server.";
 const needsToken = "the server asks for a token: set the property `token`";
 const wrongToken = "the server refuses the token";
 const spokenKeys = `${spoken} Drag or use the arrow keys to rotate it.`;
 
-export class WindsplatView extends HTMLElement {
+export class WindsplatView extends Base {
   static readonly observedAttributes: readonly string[] = observed;
+
+  // Every element has a read-only property `dataset` (of its data- attributes), which frameworks
+  // that set properties would fail to set.
+  static {
+    const inherited = Object.getOwnPropertyDescriptor(Base.prototype, "dataset");
+    Object.defineProperty(this.prototype, "dataset", {
+      configurable: true,
+      enumerable: true,
+      get(this: WindsplatView): unknown {
+        return inherited?.get?.call(this);
+      },
+      set(this: WindsplatView, id: unknown): void {
+        this.reflect("dataset", id);
+      },
+    });
+  }
 
   private readonly inside = fill(this.attachShadow({ mode: "open", delegatesFocus: true }));
   private readonly bar: ControlBar;
@@ -39,6 +57,8 @@ export class WindsplatView extends HTMLElement {
   private secret: string | undefined;
   // attributes that changed since the last microtask; "page": came into a page
   private changes = new Set<string>();
+  // whether those of `dataset` and `step` have changed later than the view
+  private attributesFirst = false;
   private playing = false;
   private told = false; // the present outage
 
@@ -54,7 +74,7 @@ export class WindsplatView extends HTMLElement {
       (run) => void window.requestAnimationFrame(run),
     );
     new PointerInput(canvas, this.moves, {
-      clicked: (x, y) => void this.pick(x, y),
+      clicked: (x, y) => void this.pickAt(x, y),
       // The wheel scrolls the page until the picture was chosen by a click or the tab key.
       takesWheel: ({ ctrlKey }) =>
         this.interactive && (ctrlKey || this.shadowRoot?.activeElement === canvas),
@@ -94,8 +114,8 @@ export class WindsplatView extends HTMLElement {
     return new URL(this.getAttribute("src") ?? "", document.baseURI).href;
   }
 
-  set src(url: string | URL) {
-    this.setAttribute("src", String(url));
+  set src(url: string | URL | null | undefined) {
+    this.reflect("src", url);
   }
 
   /** The explicit keys of the view, without the size of the picture. */
@@ -104,9 +124,14 @@ export class WindsplatView extends HTMLElement {
     return view === null ? this.askedView() : withoutSize(view);
   }
 
-  /** An object, or JSON text. */
-  set view(view: View | string) {
-    this.given = viewOf(view);
+  /**
+   * An object, or JSON text. What was set before may be set again, as frameworks do whenever they
+   * render: reset() goes back to it.
+   */
+  set view(view: View | string | null | undefined) {
+    const given = view === null || view === undefined ? null : viewOf(view);
+    if (JSON.stringify(given) === JSON.stringify(this.given)) return;
+    this.given = given;
     this.schedule("view");
   }
 
@@ -121,16 +146,16 @@ export class WindsplatView extends HTMLElement {
     return this.view.step ?? 0;
   }
 
-  set step(step: number) {
-    this.setAttribute("step", String(step));
+  set step(step: number | null | undefined) {
+    this.reflect("step", step);
   }
 
   get label(): string {
     return this.getAttribute("label") ?? "";
   }
 
-  set label(label: string) {
-    this.setAttribute("label", label);
+  set label(label: string | null | undefined) {
+    this.reflect("label", label);
   }
 
   get controls(): boolean {
@@ -138,7 +163,7 @@ export class WindsplatView extends HTMLElement {
   }
 
   set controls(on: boolean) {
-    this.toggleAttribute("controls", on);
+    this.toggleAttribute("controls", Boolean(on));
   }
 
   /** Whether pointer, wheel, keys and touch move the camera. */
@@ -146,8 +171,17 @@ export class WindsplatView extends HTMLElement {
     return this.getAttribute("interactive") !== "false";
   }
 
-  set interactive(on: boolean) {
-    this.setAttribute("interactive", String(on));
+  set interactive(on: boolean | "true" | "false" | null | undefined) {
+    this.reflect("interactive", on);
+  }
+
+  /** Whether a click asks the server what is seen there. */
+  get pick(): boolean {
+    return this.hasAttribute("pick");
+  }
+
+  set pick(on: boolean) {
+    this.toggleAttribute("pick", Boolean(on));
   }
 
   /** null: not known before the first picture. */
@@ -174,6 +208,11 @@ export class WindsplatView extends HTMLElement {
   /** Changes the view by a merge patch (RFC 7396). */
   change(patch: Patch): void {
     this.live?.stream.change(patch);
+  }
+
+  /** Shows the view of the attributes and properties again. */
+  reset(): void {
+    this.schedule("reset");
   }
 
   /** The server frames the whole volume, or faces the slice. */
@@ -206,8 +245,8 @@ export class WindsplatView extends HTMLElement {
 
   // --- the stream ------------------------------------------------------------------------
 
-  private start(attributesFirst: boolean): void {
-    const view = this.attempt(() => this.kept ?? this.askedView(attributesFirst));
+  private start(): void {
+    const view = this.attempt(() => this.kept ?? this.askedView());
     const client = this.attempt(() => new Client(this.src, { token: this.secret }));
     if (view === undefined || client === undefined) return;
     this.told = false;
@@ -243,8 +282,9 @@ export class WindsplatView extends HTMLElement {
   private apply(): void {
     const { changes } = this;
     this.changes = new Set();
-    const anew = changes.has("dataset") || changes.has("view");
-    const attributesFirst = !changes.has("view") && (changes.has("dataset") || changes.has("step"));
+    const anew = ["dataset", "view", "reset"].some((name) => changes.has(name));
+    if (changes.has("view")) this.attributesFirst = false;
+    else if (changes.has("dataset") || changes.has("step")) this.attributesFirst = true;
     const step = changes.has("step") ? this.attempt(() => stepOf(this.getAttribute("step"))) : null;
     if (changes.has("src")) this.stop();
     if (anew) this.kept = null;
@@ -252,9 +292,9 @@ export class WindsplatView extends HTMLElement {
     if (!this.isConnected) return;
     this.showAttributes();
     if (this.live === null) {
-      this.start(attributesFirst);
+      this.start();
     } else if (anew) {
-      const view = this.attempt(() => this.askedView(attributesFirst));
+      const view = this.attempt(() => this.askedView());
       if (view !== undefined) this.live.stream.replace(view);
     } else if (typeof step === "number") {
       this.seek(step);
@@ -271,10 +311,10 @@ export class WindsplatView extends HTMLElement {
 
   // Of the property `view` or else the attribute, with those of the other attributes: these hold if
   // it does not name a dataset or step itself, or if they have changed later.
-  private askedView(attributesFirst = false): View {
+  private askedView(): View {
     const view = this.given ?? viewOf(this.getAttribute("view") ?? "");
     const named = asked({}, this.getAttribute("dataset"), stepOf(this.getAttribute("step")));
-    return attributesFirst ? { ...view, ...named } : { ...named, ...view };
+    return this.attributesFirst ? { ...view, ...named } : { ...named, ...view };
   }
 
   private attempt<T>(run: () => T): T | undefined {
@@ -386,9 +426,9 @@ export class WindsplatView extends HTMLElement {
   }
 
   // What a click shows; only if the page asks for it, since the server draws a part of the picture.
-  private async pick(x: number, y: number): Promise<void> {
+  private async pickAt(x: number, y: number): Promise<void> {
     const { client, live } = this;
-    if (client === null || live === null || !this.hasAttribute("pick")) return;
+    if (client === null || live === null || !this.pick) return;
     const { view } = live.stream;
     try {
       const feature = await client.pick(view, pixelAt(view, [x, y]));
@@ -425,6 +465,12 @@ export class WindsplatView extends HTMLElement {
     this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true, composed: true }));
   }
 
+  // Frameworks remove a property by setting it to null or undefined.
+  private reflect(name: string, value: unknown): void {
+    if (value === null || value === undefined) this.removeAttribute(name);
+    else this.setAttribute(name, String(value));
+  }
+
   // A property that was set before the element was defined hides that of the class.
   private upgrade(name: string): void {
     if (!Object.hasOwn(this, name)) return;
@@ -434,17 +480,3 @@ export class WindsplatView extends HTMLElement {
     values[name] = value;
   }
 }
-
-// Every element has a read-only property `dataset` (of its data- attributes), which frameworks that
-// set properties would fail to set.
-const inherited = Object.getOwnPropertyDescriptor(HTMLElement.prototype, "dataset");
-Object.defineProperty(WindsplatView.prototype, "dataset", {
-  configurable: true,
-  enumerable: true,
-  get(this: HTMLElement): unknown {
-    return inherited?.get?.call(this);
-  },
-  set(this: HTMLElement, id: unknown): void {
-    this.setAttribute("dataset", String(id));
-  },
-});
