@@ -42,8 +42,10 @@ if ! "${buildah[@]}" inspect --type image "$base" >/dev/null 2>&1; then
   "${buildah[@]}" commit --quiet --rm "$container" "$base" >/dev/null
 fi
 
-# Settings of this machine for the build only; they are not stored in the image.
-options=(--build-arg "BASE=$base")
+# Times in the image are those of the last commit, so that equal files give an equal image. Settings
+# of this machine are for the build only; they are not stored in the image.
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
+options=(--build-arg "BASE=$base" --timestamp "$SOURCE_DATE_EPOCH")
 for name in http_proxy https_proxy no_proxy; do
   [ -z "${!name:-}" ] || options+=(--build-arg "$name=${!name}")
 done
