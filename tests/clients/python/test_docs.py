@@ -52,7 +52,7 @@ class Documents(unittest.TestCase):
             self.assertIn(text, said)
         for name, start in (("winds.png", b"\x89PNG"), ("figure.pdf", b"%PDF"),
                             ("section.png", b"\x89PNG"),
-                            ("steps.apng", b"\x89PNG"), ("turn.zip", b"PK"),
+                            ("around.zip", b"PK"), ("turn.apng", b"\x89PNG"),
                             ("arrays.png", b"\x89PNG"), ("cloud.png", b"\x89PNG")):
             self.assertTrue((self.folder / name).read_bytes().startswith(start), name)
 
