@@ -98,7 +98,7 @@ TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
   TestServer server;
   Socket drawing(server.port());
   drawing.send(
-      "GET /v1/datasets/small/frame.png?width=1200&height=1200 HTTP/1.1\r\n"
+      "GET /v1/datasets/small/frame.png?width=600&height=600 HTTP/1.1\r\n"
       "Host: x\r\n\r\n");
   // A stream that does not answer its close delays the end of the drain for a moment.
   StreamClient stream(server.port());
