@@ -121,10 +121,10 @@ quality::Setting own_setting(const scene::CompletedView& completed) {
 namespace {
 
 Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPool& pool,
-                                            const CancelToken& cancel, engine::Image& picture) {
-  auto truth = engine::reference::render(scene, pool, cancel);
+                                            const CancelToken& cancel, Workspace& workspace) {
+  auto truth = engine::reference::render(scene, pool, cancel, {}, workspace.rows_done);
   if (!truth) return truth.error();
-  picture = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
+  workspace.space.image() = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
   engine::WorkReport work;
   work.variant.reference = true;
   return work;
@@ -176,7 +176,7 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
     if (workspace.overlay) annotate::put_empty(*workspace.overlay, pool, planes);
   }
   if (scene.method == scene::Method::reference) {
-    auto work = render_reference(scene, pool, cancel, picture);
+    auto work = render_reference(scene, pool, cancel, workspace);
     if (work && jpeg) put_in_strips(picture, pool, workspace);
     return work;
   }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -104,7 +105,9 @@ struct Workspace {
   image::JpegEncoder jpeg;
   Frame drawn;  // the frame, without bytes until it is encoded
   Encoding encoding;
-  std::array<float, 3> background{};         // linear
+  std::array<float, 3> background{};  // linear
+  // Called with the number of finished rows of method reference, from any thread; may be empty.
+  std::function<void(int)> rows_done;
   std::optional<annotate::Figure> figure;    // of the frame; empty: no annotations
   std::optional<annotate::Overlay> overlay;  // its pixels; of pdf and svg those below the data
 };

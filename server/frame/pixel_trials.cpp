@@ -69,8 +69,8 @@ struct Squares {
 
 class TryingPixels {
  public:
-  TryingPixels(const scene::Scene& scene, const CancelToken& cancel)
-      : scene_(scene), cancel_(cancel), kernels_(scene), light_(scene) {}
+  TryingPixels(const scene::Scene& scene, RayGround& ground, const CancelToken& cancel)
+      : scene_(scene), cancel_(cancel), kernels_(scene), light_(scene, ground) {}
 
   // Few places may have most of the error, and sooner too few than too many of them are met: the
   // standard error is added.
@@ -187,11 +187,11 @@ Tolerances tolerances_of(const scene::Scene& scene) {
 
 class TryingSkipped {
  public:
-  TryingSkipped(const scene::Scene& scene, const CancelToken& cancel)
+  TryingSkipped(const scene::Scene& scene, RayGround& ground, const CancelToken& cancel)
       : scene_(without_tolerances(scene)),
         cancel_(cancel),
         kernels_(scene_, tolerances_of(scene)),
-        light_(scene_) {}
+        light_(scene_, ground) {}
 
   std::optional<double> run(const Spread& spread) {
     if (spread.empty) return 0.0;
@@ -255,12 +255,16 @@ PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough
   if (!scene.surfaces.empty()) return {};  // which the rays of the trials do not meet
   const RayKernels kernels(scene);
   const Spread spread = spread_places(kernels, through);
-  PixelTrials out = TryingPixels(scene, cancel).run(spread);
+  RayGround ground(scene);  // the same without tolerances
+  PixelTrials out = TryingPixels(scene, ground, cancel).run(spread);
   const Tolerances skipped = tolerances_of(scene);
-  if (scene.vector && scene.vector->streamlets && skipped.magnitude > 0) return out;
-  out.skipped_change = skipped.magnitude > 0 || skipped.optical_depth > 0
-                           ? TryingSkipped(scene, cancel).run(spread)
-                           : 0.0;
+  const bool untraced = scene.vector && scene.vector->streamlets && skipped.magnitude > 0;
+  if (!untraced) {
+    out.skipped_change = skipped.magnitude > 0 || skipped.optical_depth > 0
+                             ? TryingSkipped(scene, ground, cancel).run(spread)
+                             : 0.0;
+  }
+  out.grounds = ground.computed();
   return out;
 }
 

@@ -2,6 +2,7 @@
 // against the exact order by depth; and their change by what tolerances leave out.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct PixelTrials {
   std::optional<quality::Trials> trials;  // empty: too few places could be tried, or cancelled
   int places = 0;                         // that drew something
   double work = 0;
+  std::size_t grounds = 0;  // rays whose meeting with the body was computed
   // Mean over the picture of the channel of linear premultiplied RGBA that changes most; empty: too
   // few places could be tried, or streamlets are left out, which nothing has traced. 0 without
   // trying if the tolerances are 0.

@@ -61,30 +61,35 @@ double square_difference(const Light& a, const Light& b) {
   return sum / 4;
 }
 
-RayLight::RayLight(const scene::Scene& scene)
-    : scene_(scene), view_(reference::make_view(scene.camera)) {
-  const double cell = 1 / cells_along(scene, view_.forward);
+RayGround::RayGround(const scene::Scene& scene)
+    : scene_(scene), view_(reference::make_view(scene.camera)) {}
+
+reference::Surface RayGround::at(const PictureRay& ray) {
+  const reference::Surface none{std::numeric_limits<double>::max(), 0, {}};
+  if (!scene_.body) return none;
+  const auto [found, is_new] = known_.try_emplace({ray.x, ray.y}, none);
+  if (is_new) {
+    const reference::Surface met = reference::body_surface(*scene_.body, view_, ray.x, ray.y);
+    if (met.opacity >= 0.5) found->second = {met.depth, 1, met.color};
+  }
+  return found->second;
+}
+
+RayLight::RayLight(const scene::Scene& scene, RayGround& ground) : scene_(scene), ground_(ground) {
+  const reference::View view = reference::make_view(scene.camera);
+  const double cell = 1 / cells_along(scene, view.forward);
   const double least = least_depth(scene);
   constexpr double cells_most = 1e9;
   thinnest_ = std::min(least / cell, cells_most);
   slab_ = std::max(cell, least);
   pieces_of_slab_ = pieces_of_cell * std::max(1.0, std::ceil(thinnest_));
-  near_ = view_.perspective ? view_.near : std::numeric_limits<double>::lowest();
-  anchor_ = -reference::dot(view_.forward, view_.eye);
-}
-
-// What is behind it is hidden; pixels that it covers in part are taken as a whole.
-reference::Surface RayLight::body(const PictureRay& ray) const {
-  reference::Surface out;
-  if (scene_.body) out = reference::body_surface(*scene_.body, view_, ray.x, ray.y);
-  if (out.opacity < 0.5) return {std::numeric_limits<double>::max(), 0, {}};
-  out.opacity = 1;
-  return out;
+  near_ = view.perspective ? view.near : std::numeric_limits<double>::lowest();
+  anchor_ = -reference::dot(view.forward, view.eye);
 }
 
 Light RayLight::by_kernels(const RayKernelList& kernels, const PictureRay& ray, bool skips) const {
   Light out;
-  const reference::Surface ground = body(ray);
+  const reference::Surface ground = ground_.at(ray);
   for (const RayKernel* const one : kernels) {
     const RayKernel& kernel = *one;
     SplatOnRay on;
@@ -117,7 +122,7 @@ Light RayLight::by_kernels(const RayKernelList& kernels, const PictureRay& ray, 
 void RayLight::meet(const RayKernelList& kernels, const PictureRay& ray) {
   stretches_.clear();
   surfaces_.clear();
-  const reference::Surface ground = body(ray);
+  const reference::Surface ground = ground_.at(ray);
   if (ground.opacity > 0) surfaces_.push_back(ground);
   for (const RayKernel* const one : kernels) {
     const RayKernel& kernel = *one;

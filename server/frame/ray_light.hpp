@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "server/engine/reference/ray.hpp"
@@ -18,10 +20,29 @@ using RayKernelList = std::vector<const RayKernel*>;  // in the order of method 
 // Of RGBA, mean of the squared differences.
 double square_difference(const Light& a, const Light& b);
 
-class RayLight {
+// The body of a scene on rays. Keeps the surface of each ray: trials visit the same pixels again,
+// and the ground of a pixel that shows much of the Earth takes milliseconds.
+class RayGround {
  public:
   // The scene must outlive it.
-  explicit RayLight(const scene::Scene& scene);
+  explicit RayGround(const scene::Scene& scene);
+
+  // Opacity 1 or 0: what is behind it is hidden, so that pixels that it covers in part are taken as
+  // a whole. Without a body at the greatest depth.
+  [[nodiscard]] engine::reference::Surface at(const PictureRay& ray);
+  // Rays whose surface was computed.
+  [[nodiscard]] std::size_t computed() const { return known_.size(); }
+
+ private:
+  const scene::Scene& scene_;
+  engine::reference::View view_;
+  std::map<std::pair<double, double>, engine::reference::Surface> known_;  // by place in pixels
+};
+
+class RayLight {
+ public:
+  // The scene and its ground must outlive it.
+  RayLight(const scene::Scene& scene, RayGround& ground);
 
   // As drawn by method `kernel` with analytic compositing; without those marked as below tolerances
   // if `skips`.
@@ -63,7 +84,6 @@ class RayLight {
     std::size_t first = 0;
     std::size_t slant = 1;  // pieces to each of a ray along the view
   };
-  [[nodiscard]] engine::reference::Surface body(const PictureRay& ray) const;
   [[nodiscard]] double slant_of(const PictureRay& ray) const;
   void meet(const RayKernelList& kernels, const PictureRay& ray);
   void divide(const Stretch& one, const Division& by);
@@ -71,7 +91,7 @@ class RayLight {
   void pass(const Piece& piece, double begin, double whole, std::size_t& next, Light& to) const;
 
   const scene::Scene& scene_;
-  engine::reference::View view_;
+  RayGround& ground_;
   double near_ = 0;
   double slab_ = 1;  // depth of a slab of one cell, or the least one
   double thinnest_ = 0;

@@ -91,7 +91,8 @@ std::vector<scene::Scene> scenes() {
 
 TEST(RayLight, OfKernelsEqualsTheNaiveRenderer) {
   for (const scene::Scene& scene : scenes()) {
-    const frame::RayLight light(scene);
+    frame::RayGround ground(scene);
+    const frame::RayLight light(scene, ground);
     const auto picture = naive::render<double>(scene);
     int compared = 0;
     each_pixel(scene, [&](int x, int y, const auto& ray, const auto& kernels) {
@@ -108,7 +109,8 @@ TEST(RayLight, OfKernelsEqualsTheNaiveRenderer) {
 TEST(RayLight, ByDepthApproachesTheReferenceAndSlabsHaveTheErrorOfTheEngine) {
   ThreadPool pool(2);
   for (scene::Scene scene : scenes()) {
-    frame::RayLight light(scene);
+    frame::RayGround ground(scene);
+    frame::RayLight light(scene, ground);
     const auto reference = engine::reference::render(scene, pool, {}, {1e-6}).value();
     scene.method = scene::Method::slab;
     const engine::Rendered slabs = render(scene, 2);
