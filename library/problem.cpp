@@ -25,6 +25,7 @@ Problem::Kind kind_of(ErrorKind kind) {
     case ErrorKind::out_of_memory:
       return Problem::Kind::out_of_memory;
     case ErrorKind::not_resident:
+    case ErrorKind::conflict:
     case ErrorKind::busy:
     case ErrorKind::draining:
     case ErrorKind::cancelled:

@@ -166,7 +166,7 @@ Json to_json(const HelloMessage& message) {
               {"protocol", protocol_name},
               {"version", message.version},
               {"session", message.session},
-              {"limits", limits_json(message.image_pixels_max)},
+              {"limits", limits_json(message.limits)},
               {"datasets", std::move(datasets)}};
 }
 

@@ -58,29 +58,9 @@ std::string color_text(const std::array<unsigned char, 3>& rgb) {
   return text.data();
 }
 
-}  // namespace
-
-Problem problem_from(const Error& error) {
-  Problem problem;
-  const ProblemType& type = problem_type_of(error.kind);
-  problem.type = problem_reference(type);
-  problem.status = type.status;
-  problem.title = type.title;
-  problem.detail = error.message;
-  problem.errors = error.at;
-  return problem;
-}
-
-Json limits_json(std::int64_t image_pixels_max) {
-  return Json{{"messageBytesMax", limits::message_bytes_max},
-              {"jsonDepthMax", limits::json_depth_max},
-              {"httpHeaderBytesMax", limits::http_header_bytes_max},
-              {"httpBodyBytesMax", limits::http_body_bytes_max},
-              {"httpHeaderTimeoutS", limits::http_header_timeout_s},
-              {"httpBodyTimeoutS", limits::http_body_timeout_s},
-              {"writeTimeoutS", limits::write_timeout_s},
-              {"imageEdgeMax", limits::image_edge_max},
-              {"imagePixelsMax", image_pixels_max},
+// Those of the values of a view, and of messages about one.
+Json limits_of_views() {
+  return Json{{"imageEdgeMax", limits::image_edge_max},
               {"extinctionPointsMax", limits::extinction_points_max},
               {"scalarsMax", limits::scalars_max},
               {"surfacesMax", limits::surfaces_max},
@@ -135,21 +115,51 @@ Json limits_json(std::int64_t image_pixels_max) {
               {"fpsMin", canonical_number(limits::fps_min)},
               {"fpsMax", canonical_number(limits::fps_max)},
               {"stillScaleMax", canonical_number(limits::still_scale_max)},
-              {"decodeMsMax", canonical_number(limits::decode_ms_max)},
-              {"problemErrorsMax", limits::problem_errors_max},
-              {"pathCharsMax", limits::path_chars_max},
-              {"selectionEntriesMax", limits::selection_entries_max},
-              {"histogramBinsMax", limits::histogram_bins_max},
-              {"histogramClipMax", canonical_number(limits::histogram_clip_max)},
-              {"coordinateMax", canonical_number(limits::coordinate_max)},
-              {"seriesStepsMax", limits::series_steps_max},
-              {"jobsMax", limits::jobs_max},
-              {"jobsRunningMax", limits::jobs_running_max},
-              {"viewsMax", limits::views_max},
-              {"viewsBytesMax", limits::views_bytes_max},
-              {"videoCodecsMax", limits::video_codecs_max},
-              {"framesInFlightMax", limits::frames_in_flight_max},
-              {"sessionsMaxDefault", limits::sessions_max_default}};
+              {"decodeMsMax", canonical_number(limits::decode_ms_max)}};
+}
+
+}  // namespace
+
+Problem problem_from(const Error& error) {
+  Problem problem;
+  const ProblemType& type = problem_type_of(error.kind);
+  problem.type = problem_reference(type);
+  problem.status = type.status;
+  problem.title = type.title;
+  problem.detail = error.message;
+  problem.errors = error.at;
+  return problem;
+}
+
+Json limits_json(const ServerLimits& server) {
+  Json out = limits_of_views();
+  out.update(Json{{"messageBytesMax", limits::message_bytes_max},
+                  {"jsonDepthMax", limits::json_depth_max},
+                  {"httpHeaderBytesMax", limits::http_header_bytes_max},
+                  {"httpBodyBytesMax", limits::http_body_bytes_max},
+                  {"httpHeaderTimeoutS", limits::http_header_timeout_s},
+                  {"httpBodyTimeoutS", limits::http_body_timeout_s},
+                  {"writeTimeoutS", limits::write_timeout_s},
+                  {"imagePixelsMax", server.image_pixels_max},
+                  {"problemErrorsMax", limits::problem_errors_max},
+                  {"pathCharsMax", limits::path_chars_max},
+                  {"selectionEntriesMax", limits::selection_entries_max},
+                  {"histogramBinsMax", limits::histogram_bins_max},
+                  {"histogramClipMax", canonical_number(limits::histogram_clip_max)},
+                  {"coordinateMax", canonical_number(limits::coordinate_max)},
+                  {"seriesStepsMax", limits::series_steps_max},
+                  {"jobsMax", limits::jobs_max},
+                  {"jobsRunningMax", limits::jobs_running_max},
+                  {"valuesBytesMax", limits::values_bytes_max},
+                  {"valuesColumnsMax", limits::values_columns_max},
+                  {"uploadBytesMax", server.upload_bytes_max},
+                  {"uploadsBytesMax", server.uploads_bytes_max},
+                  {"viewsMax", limits::views_max},
+                  {"viewsBytesMax", limits::views_bytes_max},
+                  {"videoCodecsMax", limits::video_codecs_max},
+                  {"framesInFlightMax", limits::frames_in_flight_max},
+                  {"sessionsMaxDefault", limits::sessions_max_default}});
+  return out;
 }
 
 Json problem_json(const Problem& problem) {
@@ -257,7 +267,7 @@ std::string encode_service(const ServiceDescription& service) {
   return dump(Json{{"name", service.name},
                    {"version", service.version},
                    {"links", std::move(links)},
-                   {"limits", limits_json(service.image_pixels_max)}});
+                   {"limits", limits_json(service.limits)}});
 }
 
 std::string encode_color_maps(const std::vector<ColorMapDescription>& maps) {

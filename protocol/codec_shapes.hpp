@@ -8,7 +8,7 @@
 namespace windsplat::protocol {
 
 // The limits of limits.hpp in camel case; for pixels of a picture the limit of the server.
-Json limits_json(std::int64_t image_pixels_max);
+Json limits_json(const ServerLimits& server);
 Json problem_json(const Problem& problem);                     // RFC 9457
 Json frame_info_json(const FrameInfo& info);                   // Windsplat-Frame
 Json dataset_json(const DatasetDescription& dataset);          // the long form

@@ -84,8 +84,10 @@ inline constexpr double coordinate_max = 1e30;      // largest coordinate of a p
 inline constexpr int series_steps_max = 100000;
 inline constexpr int jobs_max = 64;  // including finished ones
 inline constexpr int jobs_running_max = 2;
-inline constexpr int views_max = 10000;           // stored by a server
-inline constexpr int views_bytes_max = 16777216;  // total of all views as JSON
+inline constexpr std::size_t values_bytes_max = 67108864;   // of one array of values
+inline constexpr std::size_t values_columns_max = 1000000;  // with positions of their own
+inline constexpr int views_max = 10000;                     // stored by a server
+inline constexpr int views_bytes_max = 16777216;            // total of all views as JSON
 
 inline constexpr std::size_t video_codecs_max = 16;  // names in one announcement
 inline constexpr int frames_in_flight_max = 2;       // unacknowledged, per session

@@ -181,11 +181,18 @@ struct ColorMapDescription {
   std::string kind;
   std::vector<std::array<unsigned char, 3>> colors;  // sRGB, evenly spaced
 };
+// Limits that differ between servers.
+struct ServerLimits {
+  std::int64_t image_pixels_max = limits::image_pixels_max;
+  std::uint64_t upload_bytes_max = 0;   // of an upload and of all of an address; 0: no uploads
+  std::uint64_t uploads_bytes_max = 0;  // of all uploads together
+};
+
 struct ServiceDescription {
   std::string name = "windsplat";
   std::string version;
   std::vector<std::pair<std::string, std::string>> links;
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // limit of this server
+  ServerLimits limits;
 };
 
 // --- server to client -------------------------------------------------------------------------
@@ -193,8 +200,8 @@ struct ServiceDescription {
 struct HelloMessage {
   std::string version;
   std::string session;
-  std::vector<DatasetDescription> datasets;                  // short forms
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // limit of this server
+  std::vector<DatasetDescription> datasets;  // short forms
+  ServerLimits limits;
 };
 struct OpenedMessage {
   std::uint32_t id = 0;

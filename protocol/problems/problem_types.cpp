@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view folder = "problems/";
 
-constexpr std::array<ProblemType, 26> table{{
+constexpr std::array<ProblemType, 27> table{{
     {"malformed", 400, "Bad Request",
      "The request cannot be parsed: broken JSON, an invalid query or header. Correct it; sending "
      "it again does not help."},
@@ -28,6 +28,10 @@ constexpr std::array<ProblemType, 26> table{{
     {"not-in-memory", 409, "Conflict",
      "The answer needs data that are not in memory. Ask for a picture or description that loads "
      "them, and try again after Retry-After."},
+    {"conflict", 409, "Conflict",
+     "What would be made exists already, such as an upload of that id. Remove it, or choose "
+     "another "
+     "name."},
     {"length-required", 411, "Length Required",
      "A request with a body must have Content-Length. Chunked bodies are not supported."},
     {"precondition-failed", 412, "Precondition Failed",
@@ -108,6 +112,8 @@ const ProblemType& problem_type_of(ErrorKind kind) {
         return "too-large";
       case ErrorKind::not_resident:
         return "not-in-memory";
+      case ErrorKind::conflict:
+        return "conflict";
       case ErrorKind::busy:
         return "busy";
       case ErrorKind::draining:

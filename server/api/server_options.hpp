@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/messages.hpp"
 #include "server/access/auth.hpp"
 #include "server/access/limits.hpp"
 #include "server/base/error.hpp"
@@ -29,7 +30,7 @@ struct ListenPlace {
   unsigned mode = 0660;               // of the socket's file
   bool may_lack = false;              // one of several addresses of a name: skipped if this machine
                                       // lacks it
-  int socket = -1;                    // of TCP, listens already at the above; owned by the server
+  int socket = -1;                    // listens already at the above; owned by the server
 };
 
 struct ServerOptions {
@@ -67,6 +68,15 @@ struct ServerOptions {
   // Called on the network thread at this interval while it works; zero: never.
   std::chrono::milliseconds alive_every{0};
   std::function<void()> alive;
+
+  // As published to clients.
+  [[nodiscard]] protocol::ServerLimits published_limits() const {
+    protocol::ServerLimits out{.image_pixels_max = limits.pixels_max_reported()};
+    if (!uploads) return out;
+    out.upload_bytes_max = uploads->bytes_max_per_address();
+    out.uploads_bytes_max = uploads->bytes_max();
+    return out;
+  }
 };
 
 }  // namespace windsplat::api

@@ -101,7 +101,7 @@ http::Response get_metrics(const metrics::Metrics& metrics, const tasks::Catalog
 http::Response get_service(const ServerOptions& options) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
-  service.image_pixels_max = options.limits.pixels_max_reported();
+  service.limits = options.published_limits();
   const std::string& base = options.base_path;
   service.links = {{"page", base},
                    {"datasets", base + "v1/datasets"},

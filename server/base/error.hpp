@@ -20,6 +20,7 @@ enum class ErrorKind {
   bad_data,       // 422 from a loader, exit 3: invalid or unsupported file
   too_large,      // 413, exit 2: more pixels, bytes or work than the limit
   not_resident,   // 409, exit 1: the data are not in memory yet
+  conflict,       // 409, exit 1: what would be made exists
   busy,           // 429, exit 1
   draining,       // 503, exit 1
   out_of_memory,  // 507, exit 1: over the memory limit, or a disk that is full or read-only

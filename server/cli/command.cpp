@@ -158,6 +158,7 @@ int exit_code(ErrorKind kind) {
       return exit_bad_data;
     case ErrorKind::not_found:
     case ErrorKind::not_resident:
+    case ErrorKind::conflict:
     case ErrorKind::busy:
     case ErrorKind::draining:
     case ErrorKind::out_of_memory:

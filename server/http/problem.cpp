@@ -14,12 +14,19 @@ namespace {
 
 constexpr const char* problem_type = "application/problem+json";
 
+// Whether the same request may succeed later, so that the answer says when.
+bool is_temporary(const protocol::Problem& problem) {
+  if (problem.status == 429 || problem.status == 503) return true;
+  return problem.type ==
+         protocol::problem_reference(protocol::problem_type_of(ErrorKind::not_resident));
+}
+
 Response respond(const protocol::Problem& problem, int retry_after_s) {
   Response response;
   response.status = problem.status;
   response.content_type = problem_type;
   response.headers = {{"Cache-Control", "no-store"}};
-  if (problem.status == 409 || problem.status == 429 || problem.status == 503) {
+  if (is_temporary(problem)) {
     response.headers.emplace_back("Retry-After", std::to_string(std::max(1, retry_after_s)));
   }
   response.body = Body::of(protocol::encode_problem(problem));

@@ -11,7 +11,7 @@ namespace windsplat::http {
 Response problem_response(const Error& error);
 
 // For responses of HTTP itself without an ErrorKind. `title` is the reason phrase. `retry_after_s`
-// is sent with 409, 429 and 503; at least 1.
+// is sent with 409 of data that are not in memory, 429 and 503; at least 1.
 Response problem_response(int status, std::string title, std::string detail, int retry_after_s = 0);
 
 // Adds the request id: as a header, and as requestId in a problem, whose type becomes the path of

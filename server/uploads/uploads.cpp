@@ -193,6 +193,8 @@ Result<std::shared_ptr<Uploads>> Uploads::open(Options options) {
 
 std::uint64_t Uploads::bytes_max() const { return state_->options.bytes_max; }
 
+std::uint64_t Uploads::bytes_max_per_address() const { return bytes_max() / 2; }
+
 const fs::path& Uploads::folder() const { return state_->options.folder; }
 
 std::string Uploads::path_of(const std::string& id) { return group_of(id) + '/' + id; }
@@ -209,7 +211,7 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
   State& state = *state_;
   const std::lock_guard lock(state.mutex);
   if (state.entries.contains(id) || state.receiving.contains(id)) {
-    return make_error(ErrorKind::invalid, "an upload '" + id + "' exists: delete it first");
+    return make_error(ErrorKind::conflict, "an upload '" + id + "' exists: delete it first");
   }
   const auto share = state.shares.find(address);
   const State::Share taken = share == state.shares.end() ? State::Share{} : share->second;

@@ -57,6 +57,7 @@ class Uploads {
   Uploads& operator=(const Uploads&) = delete;
 
   [[nodiscard]] std::uint64_t bytes_max() const;
+  [[nodiscard]] std::uint64_t bytes_max_per_address() const;
   [[nodiscard]] const std::filesystem::path& folder() const;
   // Path of an upload below folder().
   [[nodiscard]] static std::string path_of(const std::string& id);

@@ -157,7 +157,7 @@ class Uploads(WithUploads):
         with self.begun("c.raw", half):
             self.wait_until(lambda: len(self.files()) == 1)
             self.assert_refused(self.put("b.raw", b"x"), 507, "0 are left")
-            self.assert_refused(self.put("c.raw", b"x"), 422, "exists")
+            self.assert_refused(self.put("c.raw", b"x"), 409, "exists")
         self.wait_until(lambda: self.put("b.raw", bytes(half)).status == 201)
 
     def test_a_length_above_all_limits_is_refused_before_the_body(self):
@@ -285,7 +285,7 @@ class Uploads(WithUploads):
         self.assert_refused(self.put("a.nc", b"x", "?size=1"), 400, "'size'")
         self.assert_refused(self.put("a.nc", b"x", Content_Encoding="gzip"), 415, "Encoding")
         self.assertEqual(self.put("a.nc", b"x").status, 201)
-        self.assert_refused(self.put("a.nc", b"x"), 422, "exists")
+        self.assert_refused(self.put("a.nc", b"x"), 409, "exists")
         self.assert_refused(self.daemon.post("/v1/datasets", {"upload": "none.nc"}), 404,
                             "none.nc")
         self.assert_refused(self.daemon.post("/v1/datasets", {"upload": "a.nc", "path": "b"}), 422,

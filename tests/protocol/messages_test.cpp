@@ -165,7 +165,7 @@ TEST(ClientMessages, RefusedMessageKeepsItsIdentification) {
 
 TEST(ServerMessages, FitTheSchemaAndNameTheirType) {
   const std::vector<std::pair<std::string, ServerMessage>> messages{
-      {"hello", HelloMessage{"0.1.0", "s-1", {climate()}}},
+      {"hello", HelloMessage{"0.1.0", "s-1", {climate()}, {}}},
       {"opened", OpenedMessage{3, climate()}},
       {"progress", ProgressMessage{std::nullopt, "load", 0.5, std::nullopt}},
       {"progress", ProgressMessage{7, "load", 1, 0.5}},
@@ -185,14 +185,16 @@ TEST(ServerMessages, CarryTheirValues) {
   const Json opened = Json::parse(encode(OpenedMessage{3, climate()}));
   EXPECT_EQ(opened["id"], 3);
   EXPECT_EQ(opened["dataset"], Json::parse(encode_dataset(climate())));
-  const Json hello = Json::parse(encode(HelloMessage{"0.1.0", "s-1", {climate()}}));
+  const Json hello = Json::parse(encode(HelloMessage{"0.1.0", "s-1", {climate()}, {}}));
   EXPECT_EQ(hello["protocol"], "windsplat.v1");
   EXPECT_EQ(hello["version"], "0.1.0");
   EXPECT_EQ(hello["session"], "s-1");
   EXPECT_EQ(hello["datasets"][0]["steps"], 2);
   EXPECT_EQ(hello["limits"], Json::parse(encode_service({}))["limits"]);
-  const Json small = Json::parse(encode(HelloMessage{"0.1.0", "s-1", {}, 640 * 480}));
+  const Json small = Json::parse(encode(HelloMessage{"0.1.0", "s-1", {}, {640 * 480, 1000, 2000}}));
   EXPECT_EQ(small["limits"]["imagePixelsMax"], 307'200);
+  EXPECT_EQ(small["limits"]["uploadBytesMax"], 1000);
+  EXPECT_EQ(small["limits"]["uploadsBytesMax"], 2000);
   const Json progress = Json::parse(encode(ProgressMessage{7, "load", 0.25, 120.5}));
   EXPECT_EQ(progress, Json::parse(R"({"type":"progress","id":7,"phase":"load","done":0.25,
                                       "etaMs":120.5})"));
@@ -412,7 +414,8 @@ TEST(Shapes, LimitsAreThoseOfTheLimitsFile) {
       EXPECT_EQ(limits[name].get<double>(), std::stod(value)) << name;
     }
   }
-  EXPECT_EQ(found, limits.size());
+  constexpr std::size_t of_this_server = 2;  // those of uploads
+  EXPECT_EQ(found + of_this_server, limits.size());
   EXPECT_EQ(limits["messageBytesMax"], 65536);
   EXPECT_EQ(limits["imagePixelsMax"], 8192 * 4320);
 }

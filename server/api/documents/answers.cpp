@@ -18,13 +18,13 @@ struct Problem {
   const char* summary;
 };
 
-constexpr std::array<Problem, 17> problems{{
+constexpr std::array<Problem, 18> problems{{
     {400, "BadRequest", "The request is malformed; of JSON its detail tells where."},
     {401, "Unauthorized", "The token is absent or wrong."},
     {403, "Forbidden", "Not permitted to this client, page or server."},
     {404, "NotFound", "There is no such dataset, field, view or job."},
     {406, "NotAcceptable", "Accept permits no format that the resource has."},
-    {409, "NotResident", "The data are not in memory yet."},
+    {409, "Conflict", "The data are not in memory yet, or the id is taken."},
     {411, "LengthRequired", "A body requires Content-Length."},
     {412, "PreconditionFailed", "If-Match or If-None-Match do not hold."},
     {413, "TooLarge", "More bytes, pixels or work than the limit."},
@@ -34,13 +34,14 @@ constexpr std::array<Problem, 17> problems{{
     {426, "UpgradeRequired", "The resource is a WebSocket."},
     {429, "TooManyRequests", "The share of this client, or a queue, is full."},
     {500, "InternalError", "An error of the server; its log has the request id."},
+    {501, "NotImplemented", "The body has a Transfer-Encoding: send Content-Length."},
     {503, "Unavailable", "The server is full or shutting down."},
     {507, "InsufficientStorage", "Over the limit of memory or of storage."},
 }};
 
 // Of every operation, and of those with a body.
 constexpr std::array<int, 6> always{400, 403, 421, 429, 500, 503};
-constexpr std::array<int, 3> with_body{411, 413, 415};
+constexpr std::array<int, 4> with_body{411, 413, 415, 501};
 constexpr std::array<int, 3> retried{409, 429, 503};
 constexpr int unauthorized = 401;
 
@@ -65,7 +66,7 @@ constexpr std::array<Header, 14> known_headers{{
     {"Location", "string", "Path of the job or of what was made."},
     {"Content-Disposition", "string", "Name of the file for those who save it (RFC 6266)."},
     {"Link", "string", "Descriptions of the service (RFC 8288)."},
-    {"Retry-After", "integer", "Seconds until another attempt may succeed."},
+    {"Retry-After", "integer", "Seconds until another attempt may succeed.", false},
     {"Server-Timing", "string", "Times of queue, render and encode, milliseconds."},
     {"Windsplat-Frame", "string", "FrameInfo as JSON: method, work and error of the picture."},
     {"Windsplat-Values", "string", "Values as JSON: dimensions and axes of the array."},

@@ -35,8 +35,6 @@ namespace {
 
 namespace limits = protocol::limits;
 
-constexpr std::uint64_t array_bytes_max = std::uint64_t{64} << 20;
-constexpr std::size_t columns_max = 1'000'000;  // whose positions are sent as text
 constexpr int stride_max = 1'000'000;
 constexpr double level_rounding = 1e-6;  // of single precision, relative
 constexpr double turn_degrees = 360;
@@ -189,15 +187,16 @@ struct Selection {
 
 Result<void> check_size(const Selection& selection) {
   const std::uint64_t bytes = std::uint64_t{sizeof(float)} * selection.values();
-  if (bytes <= array_bytes_max) return {};
+  if (bytes <= protocol::limits::values_bytes_max) return {};
   const auto& n = selection.count;
   const std::string parts =
       selection.components > 1 ? std::to_string(selection.components) + " x " : "";
-  return make_error(ErrorKind::invalid,
-                    "the array of " + parts + std::to_string(n[2]) + " x " + std::to_string(n[1]) +
-                        " x " + std::to_string(n[0]) + " values has " + std::to_string(bytes) +
-                        " bytes, above the limit of " + std::to_string(array_bytes_max) +
-                        "; reduce it by bbox, level or stride");
+  return make_error(ErrorKind::invalid, "the array of " + parts + std::to_string(n[2]) + " x " +
+                                            std::to_string(n[1]) + " x " + std::to_string(n[0]) +
+                                            " values has " + std::to_string(bytes) +
+                                            " bytes, above the limit of " +
+                                            std::to_string(protocol::limits::values_bytes_max) +
+                                            "; reduce it by bbox, level or stride");
 }
 
 Result<Selection> select_samples(const ValuesQuery& asked, const Subject& subject) {
@@ -380,12 +379,13 @@ http::Response values_response(const Subject& subject, const ValuesQuery& asked,
   }
   if (is_json) {
     if (grid.columns) {
-      if (selection.count[0] * selection.count[1] > columns_max) {
+      if (selection.count[0] * selection.count[1] > protocol::limits::values_columns_max) {
         return http::problem_response(make_error(
-            ErrorKind::invalid,
-            "the positions of " + std::to_string(selection.count[0] * selection.count[1]) +
-                " columns are above the limit of " + std::to_string(columns_max) +
-                "; reduce them by bbox or stride"));
+            ErrorKind::invalid, "the positions of " +
+                                    std::to_string(selection.count[0] * selection.count[1]) +
+                                    " columns are above the limit of " +
+                                    std::to_string(protocol::limits::values_columns_max) +
+                                    "; reduce them by bbox or stride"));
       }
       add_columns(*grid.columns, grid.dims()[0], selection, description);
     }

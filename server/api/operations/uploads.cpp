@@ -30,7 +30,7 @@ Operation upload_file() {
           .query = {parameters::keep},
           .body = RequestBody{{}, {"application/octet-stream"}, "The bytes of the file."},
           .answers = {answer},
-          .problems = {404, 411, 413, 415, 422, 507}};
+          .problems = {404, 409, 422, 507}};
 }
 
 Operation remove_upload() {

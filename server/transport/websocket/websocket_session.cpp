@@ -171,7 +171,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
     const auto datasets = context_.backend.catalogue.list();
     if (!datasets) return close(close_fault, "cannot list the datasets");
     driver_.begin({WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
-                   context_.options.limits.pixels_max_reported()});
+                   context_.options.published_limits()});
     log::info("session opened",
               {{"session", id_}, {"request", request_id_}, {"client", guest_.address}});
     reader_.start();
