@@ -74,20 +74,27 @@ Result<std::uint64_t> memory_limit(const std::string& text) {
                         "for a loader and fields (a number without K, M, G or T is in bytes)");
 }
 
-void add_verbosity_options(CLI::App& command) {
+VerbosityFlags add_verbosity_flags(CLI::App& command, const VerbosityWords& words,
+                                   const std::function<void(Verbosity)>& set) {
   constexpr const char* group = "Messages";
-  command_verbosity = Verbosity::normal;
   CLI::Option* quiet = command
                            .add_flag_callback(
-                               "-q,--quiet", [] { command_verbosity = Verbosity::quiet; },
-                               "Write errors only to stderr: no notes, no progress")
+                               "-q,--quiet", [set] { set(Verbosity::quiet); }, words.quiet)
                            ->group(group);
-  command
-      .add_flag_callback(
-          "-v,--verbose", [] { command_verbosity = Verbosity::verbose; },
-          "Also write to stderr what was done")
-      ->excludes(quiet)
-      ->group(group);
+  CLI::Option* verbose = command
+                             .add_flag_callback(
+                                 "-v,--verbose", [set] { set(Verbosity::verbose); }, words.verbose)
+                             ->excludes(quiet)
+                             ->group(group);
+  return {quiet, verbose};
+}
+
+void add_verbosity_options(CLI::App& command) {
+  command_verbosity = Verbosity::normal;
+  add_verbosity_flags(
+      command,
+      {"Write errors only to stderr: no notes, no progress", "Also write to stderr what was done"},
+      [](Verbosity wanted) { command_verbosity = wanted; });
 }
 
 Verbosity verbosity() { return command_verbosity; }

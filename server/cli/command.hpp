@@ -49,7 +49,18 @@ Result<std::uint64_t> memory_limit(const std::string& text);
 
 // How much is written to stderr: errors alone, notes on results too, or also what was done.
 enum class Verbosity { quiet, normal, verbose };
-// -q, --quiet and -v, --verbose; the verbosity is set when the command is parsed.
+struct VerbosityWords {  // descriptions
+  const char* quiet;
+  const char* verbose;
+};
+struct VerbosityFlags {
+  CLI::Option* quiet;
+  CLI::Option* verbose;
+};
+// -q, --quiet and -v, --verbose, which exclude each other.
+VerbosityFlags add_verbosity_flags(CLI::App& command, const VerbosityWords& words,
+                                   const std::function<void(Verbosity)>& set);
+// The same; they set the verbosity of the process when the command is parsed.
 void add_verbosity_options(CLI::App& command);
 [[nodiscard]] Verbosity verbosity();
 

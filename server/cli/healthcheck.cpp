@@ -1,9 +1,11 @@
 // windsplat healthcheck: queries whether a running daemon is ready.
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "server/base/elapsed.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/settings_file.hpp"
 #include "server/transport/http_client.hpp"
@@ -27,9 +29,13 @@ int healthcheck(std::string url, const std::string& ca_file) {
   if (url.starts_with(unix_prefix)) url = transport::unix_url(url.substr(unix_prefix.size()), "/");
   if (url.empty() || url.back() != '/') url += '/';
   url += "readyz";
+  const auto start = std::chrono::steady_clock::now();
   const auto status = transport::http_status(url, timeout_s, ca);
   if (!status) return answer(status.error());
-  if (*status == http_ok) return exit_ok;
+  if (*status == http_ok) {
+    detail(printable(url) + " is ready: answered in " + seconds_text(seconds_since(start)));
+    return exit_ok;
+  }
   complain(printable(url) + " returned status " + std::to_string(*status));
   return exit_failed;
 }
@@ -55,6 +61,7 @@ void add_healthcheck(CLI::App& app, Action& chosen) {
           "of the system's")
       ->envname("WINDSPLAT_CA")
       ->type_name("FILE");
+  add_verbosity_options(*command);
   command->callback([&chosen, url, ca] { chosen = [url, ca] { return healthcheck(*url, *ca); }; });
 }
 

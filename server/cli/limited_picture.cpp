@@ -54,14 +54,20 @@ std::string short_text(double value) {
 }  // namespace
 
 Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
-                                        const CancelToken& cancel) {
+                                        const CancelToken& cancel, const ShowDone& show) {
   const quality::SceneSignature signature = quality::signature_of(completed.view());
   if (!tables_.begin_study(signature, frame::viewpoint_of(completed, nullptr))) return {};
   if (auto loaded = frame::load_for_calibration(completed, dataset_, cancel); !loaded) {
     return loaded.error();
   }
   data::Dataset resident = dataset_.resident_only();
+  const auto allowed = std::count_if(
+      quality::settings.begin(), quality::settings.end(),
+      [&](const quality::Setting& one) { return quality::is_allowed(one, completed.view()); });
+  int known = 0;
   const auto keep = [&](const frame::CalibrationSample& found) {
+    // Then the picture is drawn.
+    if (show) show(++known / (static_cast<double>(allowed) + 1), "measuring settings");
     tables_.add(signature, found.setting, found.viewpoint, found.measured);
   };
   const auto content = frame::described(completed, resident, tables_, cancel).viewpoint.content;
@@ -119,7 +125,8 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
   return picture;
 }
 
-Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelToken& cancel) {
+Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelToken& cancel,
+                                      const ShowDone& show) {
   const auto completed = frame::complete(view, dataset_, encoding_.allow_reference);
   if (!completed) return completed.error();
   if (is_reference(view) && view.quality.budget_ms) {
@@ -127,7 +134,13 @@ Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelTo
                          "cannot limit the time of method reference");
   }
   if (is_limited(completed->view())) {
-    if (auto done = calibrate(*completed, cancel); !done) return done.error();
+    if (auto done = calibrate(*completed, cancel, show); !done) return done.error();
+  }
+  workspace_.rows_done = nullptr;
+  if (show) {
+    workspace_.rows_done = [&show, rows = view.image.height](int done) {
+      show(static_cast<double>(done) / rows, "drawing");
+    };
   }
   quality::Setting setting = setting_of(*completed, cancel);
   auto best = draw_at(*completed, setting, cancel);

@@ -9,6 +9,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
+#include "server/cli/progress.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
 #include "server/quality/setting.hpp"
@@ -41,12 +42,14 @@ class LimitedPictures {
     if (!dataset.is_within_limit(roomy)) workspace_.space.limit_grounds(0);
   }
 
-  // Errors: those of frame::complete(), frame::prepare() and frame::produce(); invalid at
-  // /quality/budgetMs for a reference, whose time cannot be limited.
-  Result<Picture> draw(const protocol::View& view, const CancelToken& cancel);
+  // `show` may be empty. Errors: those of frame::complete(), frame::prepare() and frame::produce();
+  // invalid at /quality/budgetMs for a reference, whose time cannot be limited.
+  Result<Picture> draw(const protocol::View& view, const CancelToken& cancel,
+                       const ShowDone& show = {});
 
  private:
-  Result<void> calibrate(const scene::CompletedView& completed, const CancelToken& cancel);
+  Result<void> calibrate(const scene::CompletedView& completed, const CancelToken& cancel,
+                         const ShowDone& show);
   // Describes the view, unless it was described before.
   [[nodiscard]] quality::Setting setting_of(const scene::CompletedView& completed,
                                             const CancelToken& cancel);

@@ -49,6 +49,7 @@ Progress::~Progress() { clear(); }
 
 void Progress::show(double done, std::string_view text) {
   if (!terminal_) return;
+  const std::lock_guard lock(mutex_);
   const Clock::time_point now = Clock::now();
   if (drawn_ && now - last_ < interval) return;
   last_ = now;
@@ -60,6 +61,7 @@ void Progress::show(double done, std::string_view text) {
 }
 
 void Progress::clear() {
+  const std::lock_guard lock(mutex_);
   if (drawn_) std::fwrite(clear_line.data(), 1, clear_line.size(), stderr);
   drawn_ = false;
 }

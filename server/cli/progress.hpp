@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
+#include <mutex>
 #include <string>
 #include <string_view>
 
@@ -10,6 +12,10 @@ namespace windsplat::cli {
 // "[#######.......]  43 %, 1:05 left  text": the time left follows from the time spent.
 std::string progress_line(double done, double spent_s, std::string_view text);
 
+// Receives which part of a task is done, 0 to 1, and what is being done; from any thread.
+using ShowDone = std::function<void(double done, std::string_view doing)>;
+
+// Its functions may be called from any thread.
 class Progress {
  public:
   Progress();
@@ -26,7 +32,8 @@ class Progress {
 
  private:
   using Clock = std::chrono::steady_clock;
-  bool terminal_;
+  const bool terminal_;
+  std::mutex mutex_;  // guards the members below
   bool drawn_ = false;
   Clock::time_point start_ = Clock::now();
   Clock::time_point last_;

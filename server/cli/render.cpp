@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/base/cancel.hpp"
 #include "server/base/elapsed.hpp"
@@ -12,6 +13,7 @@
 #include "server/cli/beside/sheets.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/picture.hpp"
+#include "server/cli/progress.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -45,6 +47,8 @@ Result<void> render(const RenderArguments& arguments) {
       !free) {
     return free.error();
   }
+  Progress progress;
+  progress.show(0, "reading");
   auto panels = open_panels(arguments.view);
   if (!panels) return panels.error();
 
@@ -55,7 +59,9 @@ Result<void> render(const RenderArguments& arguments) {
   auto sheets = Sheets::of(*panels, encoding, pool);
   if (!sheets) return sheets.error();
   const auto start = std::chrono::steady_clock::now();
-  const auto sheet = sheets->draw(CancelToken());
+  const auto sheet = sheets->draw(
+      CancelToken(), [&](double done, std::string_view doing) { progress.show(done, doing); });
+  progress.clear();
   if (!sheet) return sheet.error();
   detail(std::to_string(sheet->width) + " x " + std::to_string(sheet->height) + " pixels in " +
          seconds_text(seconds_since(start)) + " to " + in_quotes(arguments.output));

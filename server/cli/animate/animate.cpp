@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -57,13 +58,16 @@ Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& s
   Progress progress;
   const std::string of_all = " of " + std::to_string(frames) + " pictures";
   for (int n = 0; n < frames; ++n) {
-    progress.show(static_cast<double>(n) / frames, std::to_string(n) + of_all);
+    const auto show = [&](double part, std::string_view) {
+      progress.show((n + part) / frames, std::to_string(n) + of_all);
+    };
+    show(0, {});
     for (std::size_t p = 0; p < panels.size(); ++p) {
       auto view = motion.view_of(n, views[p], *base, panels[p].keeps_step);
       if (!view) return view.error();
       panels[p].view = std::move(*view);
     }
-    const auto sheet = sheets.draw(cancel);
+    const auto sheet = sheets.draw(cancel, show);
     if (cancel.cancelled()) return interrupted(n, frames);
     if (!sheet) return sheet.error();
     if (auto done = sink.add(n, *sheet); !done) {

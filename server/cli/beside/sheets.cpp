@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string_view>
 #include <utility>
 
 #include "server/frame/pair/pair.hpp"
@@ -31,12 +32,18 @@ Result<Sheets> Sheets::of(std::vector<Panel>& panels, const frame::Encoding& enc
   return out;
 }
 
-Result<Sheet> Sheets::draw(const CancelToken& cancel) {
+Result<Sheet> Sheets::draw(const CancelToken& cancel, const ShowDone& show) {
   Sheet sheet;
   std::array<frame::Frame, 2> frames;
   const bool pair = panels_->size() > 1;
   for (std::size_t n = 0; n < panels_->size(); ++n) {
-    auto picture = pictures_[n].draw((*panels_)[n].view, cancel);
+    ShowDone part;
+    if (show) {
+      part = [&show, n, all = panels_->size()](double done, std::string_view doing) {
+        show((static_cast<double>(n) + done) / static_cast<double>(all), doing);
+      };
+    }
+    auto picture = pictures_[n].draw((*panels_)[n].view, cancel, part);
     if (!picture) return picture.error();
     sheet.reports += report_line(*picture);
     add_text(exceeded_limits(*picture), pair, n, sheet.exceeded);

@@ -33,8 +33,8 @@ class Sheets {
   static Result<Sheets> of(std::vector<Panel>& panels, const frame::Encoding& encoding,
                            ThreadPool& pool);
 
-  // Errors: those of LimitedPictures::draw() and frame::encode_pair().
-  Result<Sheet> draw(const CancelToken& cancel);
+  // `show` may be empty. Errors: those of LimitedPictures::draw() and frame::encode_pair().
+  Result<Sheet> draw(const CancelToken& cancel, const ShowDone& show = {});
 
  private:
   Sheets(std::vector<Panel>& panels, const frame::Encoding& encoding)

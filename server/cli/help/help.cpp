@@ -61,6 +61,7 @@ CLI::Option* add_text_command(CLI::App& app, Action& chosen, const char* name,
   CLI::App* command = app.add_subcommand(name, description);
   const auto argument = std::make_shared<std::string>();
   CLI::Option* option = command->add_option(argument_name, *argument, argument_text);
+  add_verbosity_options(*command);
   command->callback([&chosen, &app, argument, run] {
     chosen = [&app, argument, run] { return run(app, *argument); };
   });

@@ -30,7 +30,10 @@ CLI::Option* find_option(CLI::App& command, const std::string& name) {
   return nullptr;
 }
 
-bool is_setting(const std::string& name) { return name != "help" && name != "config"; }
+// Files have log-level in place of -q and -v.
+bool is_setting(const std::string& name) {
+  return name != "help" && name != "config" && name != "quiet" && name != "verbose";
+}
 
 std::string known_names(CLI::App& command) {
   std::string names;

@@ -160,10 +160,20 @@ void add_serve_options(CLI::App& command, ServeArguments& arguments) {
       ->envname("WINDSPLAT_LOG_FORMAT")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  command.add_option("--log-level", arguments.log_level, "Lowest level that is logged")
-      ->envname("WINDSPLAT_LOG_LEVEL")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
-      ->capture_default_str();
+  CLI::Option* level =
+      command.add_option("--log-level", arguments.log_level, "Lowest level that is logged")
+          ->envname("WINDSPLAT_LOG_LEVEL")
+          ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+          ->capture_default_str();
+  // As other options they have precedence over the environment, which is read after them.
+  const auto [quiet, verbose] = add_verbosity_flags(
+      command,
+      {"Log warnings and errors only, as --log-level warn", "Log all, as --log-level debug"},
+      [&arguments, level](Verbosity wanted) {
+        arguments.verbosity_level = wanted == Verbosity::quiet ? "warn" : "debug";
+        level->envname("");
+      });
+  for (CLI::Option* const flag : {quiet, verbose}) flag->trigger_on_parse()->excludes(level);
 }
 
 }  // namespace windsplat::cli

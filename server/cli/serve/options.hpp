@@ -39,6 +39,7 @@ struct ServeArguments {
   std::string log_format = "text";
   std::string log_level = "info";
   access::Limits limits;
+  std::string verbosity_level;  // that of -q or -v, which replaces log_level; empty: neither
 };
 
 // `arguments` must outlive the command.

@@ -45,8 +45,10 @@ constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert
 constexpr std::chrono::seconds reload_patience{1};
 
 void configure_log(const ServeArguments& arguments) {
+  const std::string& level =
+      arguments.verbosity_level.empty() ? arguments.log_level : arguments.verbosity_level;
   log::configure(arguments.log_format == "json" ? log::Format::json : log::Format::text,
-                 log::parse_level(arguments.log_level).value_or(log::Level::info));
+                 log::parse_level(level).value_or(log::Level::info));
 }
 
 // Signal handling of the daemon. The watching thread starts before the server, which exists only
