@@ -72,6 +72,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat> --count=600)
   windsplat_program_test(uploads ${SYSTEM_PYTHON} tests/integration/uploads.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(archives ${SYSTEM_PYTHON} tests/integration/archives.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(install python3 tests/integration/install_test.py

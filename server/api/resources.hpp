@@ -117,13 +117,11 @@ void patch_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const st
 void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                  const http::Request& request, http::Reply reply);
 
-// Where the body of a PUT of an upload goes, or why it is refused; `disk` writes it.
+// Where the body of a PUT of an upload goes, which also answers, or why it is refused; `disk`
+// writes it.
 StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
                             const std::string& id, const http::Request& request,
                             std::uint64_t bytes);
-// Checks the upload that was received, and makes it visible.
-void put_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
-                const http::Request& request, http::Reply reply);
 http::Response get_upload(const ServerOptions& options, const std::string& id);
 // With the datasets that were opened from it.
 void delete_upload(const ServerOptions& options, tasks::TaskExecutor& disk,

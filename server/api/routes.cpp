@@ -224,7 +224,10 @@ std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecut
                                  tasks::Catalogue& catalogue) {
   std::vector<Route> rows{
       Route{"GET", "/v1/uploads/{id}", operations::read_upload(), at_once(get_upload, options)},
-      Route{"PUT", "/v1/uploads/{id}", operations::upload_file(), later(put_upload, options, disk)},
+      Route{"PUT", "/v1/uploads/{id}", operations::upload_file(),
+            [](const PathValues&, const http::Request& request, const http::Reply& reply) {
+              request.sink->answer(request, reply);
+            }},
   };
   rows.back().open_sink = [&options, &disk](const PathValues& values, const http::Request& request,
                                             std::uint64_t bytes) {

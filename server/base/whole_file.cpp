@@ -11,6 +11,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/disk_error.hpp"
+
 namespace windsplat {
 namespace {
 
@@ -22,10 +24,8 @@ Error file_error(const char* what, const fs::path& path, int fault) {
   std::string message = what;
   message += " '";
   message += printable(path.native());
-  message += "': ";
-  message += std::generic_category().message(fault);
-  const bool full = fault == ENOSPC || fault == EDQUOT;
-  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(message));
+  message += '\'';
+  return disk_error(fault, message);
 }
 
 // Returns 0 or the errno of the failed call.

@@ -23,6 +23,8 @@ class BodySink {
   // Takes the next bytes; may return before that is done. `done` is called once, from any thread;
   // further bytes are received after it.
   virtual void take(std::vector<std::byte> bytes, Done done) = 0;
+  // Answers the request, once all of its body was taken.
+  virtual void answer(const Request& request, Reply reply) = 0;
 };
 
 }  // namespace windsplat::http

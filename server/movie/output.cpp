@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/disk_error.hpp"
 #include "server/base/whole_file.hpp"
 
 namespace windsplat::movie {
@@ -50,9 +51,7 @@ data::Descriptor unnamed_file() {
 
 Error Output::failed(const char* what, int fault) const {
   const std::string name = path_.empty() ? std::string("the output") : in_quotes(path_.native());
-  const bool full = fault == ENOSPC || fault == EDQUOT || fault == EFBIG;
-  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal,
-                    std::string(what) + ' ' + name + ": " + std::generic_category().message(fault));
+  return disk_error(fault, std::string(what) + ' ' + name);
 }
 
 Result<Output> Output::at(const fs::path& path) {

@@ -14,8 +14,9 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/disk_error.hpp"
 #include "server/base/log.hpp"
-#include "server/uploads/zip.hpp"
+#include "server/data/loader/unpack.hpp"
 
 namespace windsplat::uploads {
 namespace fs = std::filesystem;
@@ -32,13 +33,7 @@ bool is_id_letter(char c) {
          c == '_';
 }
 
-std::string disk_words(int fault) { return std::generic_category().message(fault); }
-
-Error disk_error(int fault) {
-  const bool full = fault == ENOSPC || fault == EDQUOT;
-  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal,
-                    "the upload cannot be stored: " + disk_words(fault));
-}
+Error not_stored(int fault) { return disk_error(fault, "the upload cannot be stored"); }
 
 bool is_archive(const std::string& id) { return id.ends_with(".zip"); }
 
@@ -56,6 +51,20 @@ fs::path innermost(const fs::path& folder) {
 }
 
 std::string group_of(const std::string& id) { return id.substr(0, id.find('.')); }
+
+bool is_real_folder(const fs::path& path) {
+  std::error_code fault;
+  return fs::is_directory(fs::symlink_status(path, fault));
+}
+
+std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& fault) {
+  std::vector<fs::path> out;
+  for (fs::directory_iterator at(folder, fault); !fault && at != fs::directory_iterator();
+       at.increment(fault)) {
+    out.push_back(at->path());
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -84,19 +93,25 @@ struct Uploads::State {
     std::size_t at_a_time = 0;
   };
 
-  // Unpacks the archive at a path beside it. Errors: those of zip.hpp; out_of_memory (quota).
-  Result<void> unpack(const Announced& announced, const fs::path& path, int file) {
-    const auto entries = list_zip(file, announced.bytes);
-    if (!entries) return entries.error();
-    {
-      const std::lock_guard lock(mutex);
-      const std::uint64_t bytes = disk_bytes_of(*entries);
-      if (auto ok = take(announced.address, bytes, "unpacked "); !ok) return ok;
-      receiving[announced.id] += bytes;
-    }
+  // Unpacks the archive at a path beside it. Errors: those of loader::unpack(); out_of_memory
+  // (quota).
+  Result<void> unpack(const Announced& announced, const fs::path& path) {
     const fs::path folder = folder_beside(path);
-    if (::mkdir(folder.c_str(), S_IRWXU) != 0) return disk_error(errno);
-    return unpack_zip(file, *entries, folder);
+    if (::mkdir(folder.c_str(), S_IRWXU) != 0) return not_stored(errno);
+    const auto reserve = [&](std::uint64_t bytes) {
+      return take_for(announced, bytes, "unpacked " + std::to_string(bytes));
+    };
+    return data::loader::unpack({.archive = path, .folder = folder, .reserve = reserve});
+  }
+
+  // For an upload that is being received, which has `size` bytes. Errors: out_of_memory.
+  Result<void> take_for(const Announced& announced, std::uint64_t bytes, const std::string& size) {
+    const std::lock_guard lock(mutex);
+    if (bytes > left_for(announced.address)) return no_room(announced.address, size);
+    bytes_taken += bytes;
+    shares[announced.address].bytes += bytes;
+    receiving[announced.id] += bytes;
+    return {};
   }
 
   // Removes the files, perhaps thousands, for which nobody else waits.
@@ -113,21 +128,17 @@ struct Uploads::State {
   }
 
   // The others require the mutex.
-  // Errors: out_of_memory.
-  Result<void> take(const std::string& address, std::uint64_t bytes, const char* how) {
+  [[nodiscard]] std::uint64_t left_for(const std::string& address) const {
     const auto share = shares.find(address);
     const std::uint64_t own = share == shares.end() ? 0 : share->second.bytes;
-    const std::uint64_t all = options.bytes_max;
-    const std::uint64_t left = std::min(all - bytes_taken, all / 2 - own);
-    if (bytes > left) {
-      return make_error(ErrorKind::out_of_memory,
-                        std::string("the upload has ") + how + std::to_string(bytes) +
-                            " bytes, and " + std::to_string(left) + " are left of --upload-limit " +
-                            std::to_string(all) + ", of which an address may have half");
-    }
-    bytes_taken += bytes;
-    shares[address].bytes += bytes;
-    return {};
+    return std::min(options.bytes_max - bytes_taken, options.bytes_max / 2 - own);
+  }
+  [[nodiscard]] Error no_room(const std::string& address, const std::string& size) const {
+    return make_error(ErrorKind::out_of_memory, "the upload has " + size + " bytes, and " +
+                                                    std::to_string(left_for(address)) +
+                                                    " are left of --upload-limit " +
+                                                    std::to_string(options.bytes_max) +
+                                                    ", of which an address may have half");
   }
   void release(const std::string& address, std::uint64_t bytes) {
     bytes_taken -= bytes;
@@ -156,16 +167,41 @@ struct Uploads::State {
   std::uint64_t bytes_taken = 0;
   std::uint64_t count = 0;  // names of incomplete files
   std::map<std::string, Entry> entries;
-  std::map<std::string, std::uint64_t> receiving;  // ids, and the bytes that each takes
+  std::map<std::string, std::uint64_t> receiving;  // ids, and the bytes that each has taken
   std::map<std::string, Share> shares;
 };
 
 Uploads::Uploads(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
 Uploads::~Uploads() {
+  if (const auto ok = remove_leftovers(state_->options.folder); !ok) {
+    log::warn("uploads cannot be removed", {{"fault", ok.error().message}});
+  }
+}
+
+// Uploads are below the folder of their group; what does not have such a name is not ours.
+Result<void> Uploads::remove_leftovers(const fs::path& folder) {
+  if (!is_real_folder(folder) || !is_real_folder(folder / incomplete)) return {};
   std::error_code fault;
-  fs::remove_all(state_->options.folder, fault);
-  if (fault) log::warn("uploads cannot be removed", {{"fault", fault.message()}});
+  for (const fs::path& group : entries_of(folder, fault)) {
+    const std::string name = group.filename();
+    if (name == incomplete || !is_upload_id(name) || !is_real_folder(group)) continue;
+    for (const fs::path& one : entries_of(group, fault)) {
+      const std::string id = one.filename();
+      if (is_upload_id(id) && group_of(id) == name) fs::remove_all(one, fault);
+      if (fault) break;
+    }
+    ::rmdir(group.c_str());  // unless it has other files
+    if (fault) break;
+  }
+  // The mark by which the folder is known goes last.
+  if (!fault) fs::remove_all(folder / incomplete, fault);
+  if (fault) {
+    return make_error(ErrorKind::internal,
+                      "'" + printable(folder.native()) + "' cannot be emptied: " + fault.message());
+  }
+  ::rmdir(folder.c_str());  // unless it has other files
+  return {};
 }
 
 Result<std::shared_ptr<Uploads>> Uploads::open(Options options) {
@@ -173,18 +209,13 @@ Result<std::shared_ptr<Uploads>> Uploads::open(Options options) {
     return make_error(ErrorKind::invalid,
                       "the folder of uploads '" + printable(options.folder.native()) + "' " + why);
   };
-  std::error_code fault;
-  // What a daemon left that was killed has this folder; other files are not ours to remove.
-  if (fs::exists(options.folder, fault) && !fs::is_empty(options.folder, fault) &&
-      !fs::is_directory(options.folder / incomplete, fault)) {
-    return unusable("has other files: choose another --state-dir");
-  }
-  fs::remove_all(options.folder, fault);
-  if (fault) return unusable("cannot be emptied: " + fault.message());
+  if (const auto ok = remove_leftovers(options.folder); !ok) return unusable(ok.error().message);
   for (const fs::path& folder : {options.folder, options.folder / incomplete}) {
-    if (::mkdir(folder.c_str(), S_IRWXU) != 0) {
-      return unusable("cannot be created: " + disk_words(errno));
-    }
+    ::rmdir(folder.c_str());  // an empty one may have another mode
+    if (::mkdir(folder.c_str(), S_IRWXU) == 0) continue;
+    return unusable(errno == EEXIST
+                        ? "has other files: choose another --state-dir"
+                        : "cannot be created: " + std::generic_category().message(errno));
   }
   auto state = std::make_shared<State>();
   state->options = std::move(options);
@@ -219,19 +250,11 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
       state.entries.size() + state.receiving.size() >= uploads_max) {
     return Error{ErrorKind::busy, "too many uploads at a time", {}, 1};
   }
-  const fs::path path = state.options.folder / incomplete / std::to_string(state.count);
-  const int file =
-      ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
-  if (file < 0) return disk_error(errno);
-  ++state.count;
-  if (const auto ok = state.take(address, bytes, ""); !ok) {
-    ::close(file);
-    ::unlink(path.c_str());
-    return ok.error();
-  }
-  state.receiving[id] = bytes;
+  if (bytes > state.left_for(address)) return state.no_room(address, std::to_string(bytes));
+  state.receiving[id] = 0;
   ++state.shares[address].at_a_time;
-  return std::shared_ptr<Incoming>(new Incoming(state_, announced, path, file));
+  const fs::path path = state.options.folder / incomplete / std::to_string(state.count++);
+  return std::shared_ptr<Incoming>(new Incoming(state_, announced, path));
 }
 
 Result<Upload> Uploads::find(const std::string& id) const {
@@ -288,35 +311,44 @@ std::vector<std::string> Uploads::expire(std::time_t now) {
   return out;
 }
 
-Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, fs::path path,
-                   int file)
-    : state_(std::move(state)),
-      announced_(std::move(announced)),
-      path_(std::move(path)),
-      file_(file) {}
+Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, fs::path path)
+    : state_(std::move(state)), announced_(std::move(announced)), path_(std::move(path)) {}
 
 Incoming::~Incoming() { discard(); }
 
 void Incoming::discard() {
-  if (file_ < 0) return;  // finished
-  ::close(std::exchange(file_, -1));
-  ::unlink(path_.c_str());
-  std::error_code fault;
-  if (is_archive(announced_.id)) fs::remove_all(folder_beside(path_), fault);
+  if (std::exchange(ended_, true)) return;
+  if (file_ >= 0) {
+    ::close(file_);
+    ::unlink(path_.c_str());
+    std::error_code fault;
+    if (is_archive(announced_.id)) fs::remove_all(folder_beside(path_), fault);
+  }
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t taken = state_->receiving[announced_.id];
   state_->end_receiving(announced_.id, announced_.address);
   state_->release(announced_.address, taken);
 }
 
+Result<void> Incoming::open_file() {
+  if (file_ >= 0) return {};
+  file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
+                 S_IRUSR | S_IWUSR);
+  if (file_ < 0) return not_stored(errno);
+  return {};
+}
+
 Result<void> Incoming::write(std::span<const std::byte> bytes) {
   if (bytes.size() > announced_.bytes - written_) {
     return make_error(ErrorKind::invalid, "the upload is longer than announced");
   }
+  if (auto ok = open_file(); !ok) return ok;
+  const std::string size = std::to_string(announced_.bytes);
+  if (auto ok = state_->take_for(announced_, bytes.size(), size); !ok) return ok;
   for (auto rest = bytes; !rest.empty();) {
     const ssize_t done = ::write(file_, rest.data(), rest.size());
     if (done < 0 && errno == EINTR) continue;
-    if (done < 0) return disk_error(errno);
+    if (done < 0) return not_stored(errno);
     rest = rest.subspan(static_cast<std::size_t>(done));
   }
   hasher_.add(bytes);
@@ -342,16 +374,17 @@ Result<Upload> Incoming::publish() {
   }
   const bool archive = is_archive(announced_.id);
   if (archive) {
-    if (const auto ok = state_->unpack(announced_, path_, file_); !ok) return ok.error();
+    if (const auto ok = state_->unpack(announced_, path_); !ok) return ok.error();
   }
   const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
   const std::lock_guard lock(state_->mutex);
   const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
   if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST) {
-    return disk_error(errno);
+    return not_stored(errno);
   }
-  if (::rename(from.c_str(), path.c_str()) != 0) return disk_error(errno);
-  ::close(std::exchange(file_, -1));
+  if (::rename(from.c_str(), path.c_str()) != 0) return not_stored(errno);
+  ::close(file_);
+  ended_ = true;
   std::uint64_t taken = state_->receiving[announced_.id];
   if (archive) {
     std::error_code fault;

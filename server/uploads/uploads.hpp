@@ -21,7 +21,7 @@ inline constexpr int keep_s_default = 3600;
 inline constexpr int keep_s_max = 7 * 86400;
 
 struct Options {
-  std::filesystem::path folder;  // private; what it holds is removed at both ends
+  std::filesystem::path folder;  // private; uploads are removed from it at both ends
   std::uint64_t bytes_max = 0;   // of all files; one address may have half of it
 };
 
@@ -50,8 +50,12 @@ class Incoming;
 // data are companions.
 class Uploads {
  public:
-  // Creates the folder, readable only by its owner, and empties it. Errors: invalid.
+  // Creates the folder, readable only by its owner, without what a killed daemon left. Errors:
+  // invalid (it cannot be created, or has other files).
   static Result<std::shared_ptr<Uploads>> open(Options options);
+  // Removes the uploads of a daemon that was killed, and the folder unless it has other files. Does
+  // nothing to folders that this class has not made. Errors: internal (disk).
+  static Result<void> remove_leftovers(const std::filesystem::path& folder);
   ~Uploads();
   Uploads(const Uploads&) = delete;
   Uploads& operator=(const Uploads&) = delete;
@@ -62,8 +66,9 @@ class Uploads {
   // Path of an upload below folder().
   [[nodiscard]] static std::string path_of(const std::string& id);
 
-  // Reserves room for all of it. Errors: invalid (id, no bytes, or an upload of that id exists);
-  // busy (too many at a time); out_of_memory (quota).
+  // Takes the id, and room as bytes arrive; does not wait for a disk. Errors: invalid (id, no
+  // bytes); conflict (an upload of that id exists); busy (too many at a time); out_of_memory (more
+  // than what is left of the quota).
   Result<std::shared_ptr<Incoming>> begin(const Announced& announced);
   // Errors: not_found.
   [[nodiscard]] Result<Upload> find(const std::string& id) const;
@@ -90,7 +95,7 @@ class Incoming {
   Incoming(const Incoming&) = delete;
   Incoming& operator=(const Incoming&) = delete;
 
-  // Errors: out_of_memory (disk full), internal (disk).
+  // Errors: out_of_memory (quota, disk full), internal (disk).
   Result<void> write(std::span<const std::byte> bytes);
   // Makes it visible, or discards it. Errors: invalid (another digest than announced); those of
   // write(); of a ZIP archive, which is unpacked, bad_data.
@@ -98,16 +103,17 @@ class Incoming {
 
  private:
   friend class Uploads;
-  Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path,
-           int file);
+  Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path);
 
+  Result<void> open_file();
   Result<Upload> publish();
   void discard();
 
   const std::shared_ptr<Uploads::State> state_;
   const Announced announced_;
   const std::filesystem::path path_;
-  int file_ = -1;
+  int file_ = -1;       // from the first byte on
+  bool ended_ = false;  // finished or discarded
   std::uint64_t written_ = 0;
   Hasher hasher_;
 };

@@ -9,11 +9,14 @@ The program writes the netCDF files of seeds.py. Needs python3-netcdf4 for the m
 """
 
 import argparse
+import io
 import json
 import pathlib
 import shutil
+import struct
 import sys
 import tempfile
+import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "integration"))
@@ -147,6 +150,27 @@ def descriptions():
         b'    NC_GLOBAL { String title "Air"; Alias same .t; }\n}\n')
 
 
+def archives():
+    """ZIP archives, and of one of them every cut and every changed byte of its records."""
+    for method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w", method) as archive:
+            archive.writestr("a/b", bytes(range(100)) * 3)
+            archive.writestr("c/", b"")
+            archive.comment = b"made"
+        yield "zip", f"method-{method}", out.getvalue()
+    whole = out.getvalue()
+    end, directory = whole.rindex(b"PK\5\6"), whole.index(b"PK\1\2")
+    record = struct.pack("<IQHHIIQQQQ", 0x06064b50, 44, 45, 45, 0, 0, 2, 2, end - directory,
+                         directory)
+    locator = struct.pack("<IIQI", 0x07064b50, 0, end, 1)
+    yield "zip", "zip64", (whole[:end] + record + locator + whole[end:end + 8] + b"\xff" * 12 +
+                           whole[end + 20:])
+    for at in range(directory, len(whole)):
+        yield "zip", f"changed-{at}", whole[:at] + bytes([whole[at] ^ 0xff]) + whole[at + 1:]
+        yield "zip", f"cut-{at}", whole[:at]
+
+
 def files(program):
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
@@ -195,7 +219,7 @@ def main():
     options = parser.parse_args()
     shutil.rmtree(options.out, ignore_errors=True)
     for kind, inputs in (("seed", vectors()), ("seed", requests()),
-                         ("seed", configurations()), ("seed", descriptions()),
+                         ("seed", configurations()), ("seed", descriptions()), ("seed", archives()),
                          ("seed", files(options.program)), ("seed", files_of_models()),
                          ("seed", loader_inputs.loader_seeds()), ("size", sizes.sizes()),
                          ("size", loader_inputs.loader_sizes())):

@@ -33,7 +33,7 @@ CONFINED = [
     ("PROJ", r"proj\.h",
      r"server/data/cf/grid/(proj_context\.hpp|(projected_columns|crs_wkt)\.cpp)|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h",
-     r"server/(data|ground|uploads|vtk_loader)/.*|server/(http/gzip|movie/zip)\.cpp|tests/.*"),
+     r"server/(data|ground|vtk_loader)/.*|server/(http/gzip|movie/zip)\.cpp|tests/.*"),
     ("VTK", r"vtk\w+\.h", r"server/vtk_loader/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),

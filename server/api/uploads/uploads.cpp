@@ -2,6 +2,7 @@
 #include "server/uploads/uploads.hpp"
 
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,11 +26,30 @@ http::Response uploads_are_off() {
                                 "and --state-dir");
 }
 
-// Writes on a thread of the executor.
+http::Response upload_response(const uploads::Upload& upload) {
+  const std::string digest = uploads::digest_text(upload.digest);
+  http::Response response = json_response(protocol::encode_upload(
+      {upload.id, upload.bytes, digest, protocol::utc_text(upload.expires)}));
+  response.headers = {{"Cache-Control", "no-store"}};
+  return response;
+}
+
+// Works on a thread of the executor.
 class UploadSink final : public http::BodySink {
  public:
-  UploadSink(std::shared_ptr<Incoming> into, tasks::TaskExecutor& disk, const CancelToken& cancel)
-      : into_(std::move(into)), disk_(disk), cancel_(cancel) {}
+  UploadSink(std::shared_ptr<Incoming> into, tasks::TaskExecutor& disk, const CancelToken& cancel,
+             std::string base_path)
+      : into_(std::move(into)), disk_(disk), cancel_(cancel), base_path_(std::move(base_path)) {}
+  // The network thread, which closes connections, does not wait for a file that is removed: a task
+  // has the last reference.
+  ~UploadSink() override {
+    try {
+      static_cast<void>(disk_.submit({{}, [into = std::move(into_)] {}, true}));
+    } catch (const std::bad_alloc&) {  // removed here
+    }
+  }
+  UploadSink(const UploadSink&) = delete;
+  UploadSink& operator=(const UploadSink&) = delete;
 
   void take(std::vector<std::byte> bytes, Done done) override {
     // Admitted: one part of each upload at a time, of which there are few.
@@ -43,21 +63,24 @@ class UploadSink final : public http::BodySink {
     if (!queued) (*answer)(http::problem_response(queued.error()));
   }
 
-  [[nodiscard]] const std::shared_ptr<Incoming>& into() const { return into_; }
+  void answer(const http::Request& request, http::Reply reply) override {
+    run_later(disk_, request, std::move(reply), "an upload", nullptr,
+              [into = into_, base_path = base_path_] {
+                const auto upload = into->finish();
+                if (!upload) return http::problem_response(upload.error());
+                http::Response response = upload_response(*upload);
+                response.status = 201;
+                response.headers.emplace_back("Location", base_path + "v1/uploads/" + upload->id);
+                return response;
+              });
+  }
 
  private:
-  const std::shared_ptr<Incoming> into_;
+  std::shared_ptr<Incoming> into_;
   tasks::TaskExecutor& disk_;
   const CancelToken cancel_;
+  const std::string base_path_;
 };
-
-http::Response upload_response(const uploads::Upload& upload) {
-  const std::string digest = uploads::digest_text(upload.digest);
-  http::Response response = json_response(protocol::encode_upload(
-      {upload.id, upload.bytes, digest, protocol::utc_text(upload.expires)}));
-  response.headers = {{"Cache-Control", "no-store"}};
-  return response;
-}
 
 // What the header announces. Errors: invalid, malformed.
 Result<uploads::Announced> read_announced(const std::string& id, const http::Request& request,
@@ -95,25 +118,8 @@ StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& d
   if (!announced) return {nullptr, http::problem_response(announced.error())};
   auto into = options.uploads->begin(*announced);
   if (!into) return {nullptr, http::problem_response(into.error())};
-  return {std::make_shared<UploadSink>(std::move(*into), disk, request.cancel), std::nullopt};
-}
-
-void put_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
-                const http::Request& request, http::Reply reply) {
-  const auto sink = std::dynamic_pointer_cast<UploadSink>(request.sink);
-  if (!sink) {
-    reply(http::problem_response(make_error(ErrorKind::invalid, "an upload must have a body")));
-    return;
-  }
-  run_later(disk, request, std::move(reply), "an upload", nullptr,
-            [into = sink->into(), base_path = options.base_path] {
-              const auto upload = into->finish();
-              if (!upload) return http::problem_response(upload.error());
-              http::Response response = upload_response(*upload);
-              response.status = 201;
-              response.headers.emplace_back("Location", base_path + "v1/uploads/" + upload->id);
-              return response;
-            });
+  return {std::make_shared<UploadSink>(std::move(*into), disk, request.cancel, options.base_path),
+          std::nullopt};
 }
 
 http::Response get_upload(const ServerOptions& options, const std::string& id) {

@@ -206,6 +206,21 @@ std::function<Result<data::Location>(const std::string&)> locate_on(const Fetche
   };
 }
 
+// Null: none are accepted. Called while the folder of the state is locked, so that uploads found in
+// it are those of a daemon that was killed.
+Result<std::shared_ptr<uploads::Uploads>> open_uploads(const ServeArguments& arguments) {
+  if (arguments.state_dir.empty()) return std::shared_ptr<uploads::Uploads>();
+  const auto folder = std::filesystem::absolute(arguments.state_dir) / "uploads";
+  if (const auto bytes = upload_bytes(arguments); bytes && *bytes > 0) {
+    return uploads::Uploads::open({folder, *bytes});
+  }
+  if (const auto ok = uploads::Uploads::remove_leftovers(folder); !ok) {
+    log::warn("uploads of a daemon that was killed cannot be removed",
+              {{"fault", ok.error().message}});
+  }
+  return std::shared_ptr<uploads::Uploads>();
+}
+
 int serve(const CLI::App& given) {
   auto manager = ServiceManager::from_environment();
   if (!manager) return answer(manager.error());
@@ -237,12 +252,9 @@ int serve(const CLI::App& given) {
   options.views = std::move(*views);
   options.alive_every = (*manager)->alive_every();
   options.alive = [told = *manager] { told->alive(); };
-  if (const auto bytes = upload_bytes(arguments); bytes && *bytes > 0) {
-    const auto folder = std::filesystem::absolute(arguments.state_dir) / "uploads";
-    auto uploads = uploads::Uploads::open({folder, *bytes});
-    if (!uploads) return answer(uploads.error());
-    options.uploads = std::move(*uploads);
-  }
+  auto uploads = open_uploads(arguments);
+  if (!uploads) return answer(uploads.error());
+  options.uploads = std::move(*uploads);
   transport::Server server(std::move(options), store,
                            std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());

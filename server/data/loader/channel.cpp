@@ -130,7 +130,7 @@ Fate receive_message(int socket, Message& out, std::size_t bytes_max, Descriptor
   }
   std::memcpy(&frame, head.data(), sizeof frame);
   if (frame.kind < static_cast<std::uint32_t>(Kind::open) ||
-      frame.kind > static_cast<std::uint32_t>(Kind::whole) || frame.zero != 0 ||
+      frame.kind > static_cast<std::uint32_t>(Kind::unpacked) || frame.zero != 0 ||
       frame.bytes > bytes_max) {
     return Fate::broken;
   }

@@ -40,6 +40,12 @@ enum class Kind : std::uint32_t {
   part,   // loader -> daemon: component, layers and half of the window -> taken, in order
   taken,  // daemon -> loader: that half may be overwritten
   whole,  // loader -> daemon: answer to read: the field cannot be read in parts
+  // of archives
+  unpack,       // daemon -> loader: what to do, with the archive -> entries or failed
+  entries,      // loader -> daemon: bytes of disk; then each entry and its bytes
+  entry,        // loader -> daemon: name
+  entry_bytes,  // loader -> daemon: the next bytes of the last entry
+  unpacked,     // loader -> daemon: that was all
 };
 
 using Clock = std::chrono::steady_clock;

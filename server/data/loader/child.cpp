@@ -23,6 +23,7 @@
 #include "server/data/loader/messages.hpp"
 #include "server/data/loader/process.hpp"
 #include "server/data/loader/transfer.hpp"
+#include "server/data/loader/unpack.hpp"
 #include "server/data/loader/window.hpp"
 #include "server/data/open/open.hpp"
 
@@ -269,6 +270,8 @@ int run() {
       loader.open(message.payload);
     } else if (message.kind == Kind::read) {
       loader.read(message);
+    } else if (message.kind == Kind::unpack && message.descriptor) {
+      send_archive(message.descriptor);
     } else {
       leave();
     }

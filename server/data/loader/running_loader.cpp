@@ -33,11 +33,6 @@ Program& program() {
   return the_one;
 }
 
-std::string program_path() {
-  const std::lock_guard lock(program().mutex);
-  return program().path;
-}
-
 // Empty: not there.
 std::string case_program_path() {
   const std::lock_guard lock(program().mutex);
@@ -89,6 +84,11 @@ std::string opening_limit(const Files& files, std::uint64_t memory_bytes) {
 }
 
 }  // namespace
+
+std::string program_path() {
+  const std::lock_guard lock(program().mutex);
+  return program().path;
+}
 
 void set_program(std::string path) {
   const std::lock_guard lock(program().mutex);

@@ -17,6 +17,9 @@
 
 namespace windsplat::data::loader {
 
+// The executable of loaders (set_program()); empty: none is set.
+std::string program_path();
+
 class RunningLoader {
  public:
   // One call to the loader.

@@ -68,7 +68,8 @@ class FaultyLoader : public testing::Test {
     script += "s = socket.socket(fileno=3)\n";
     script += "names = 'open read descriptor names yes no ask_open ask_list ask_exists ";
     script += "ask_library progress opened filled failed ";
-    script += "ask_bytes extent close_parts part taken whole'.split()\n";
+    script += "ask_bytes extent close_parts part taken whole ";
+    script += "unpack entries entry entry_bytes unpacked'.split()\n";
     script += "K = {name: i + 1 for i, name in enumerate(names)}\n";
     script += "def send(kind, payload=b''):\n";
     script += "    s.sendall(struct.pack('<IIQ', K[kind], 0, len(payload)) + payload)\n";
@@ -89,7 +90,7 @@ class FaultyLoader : public testing::Test {
     script += "    send('opened', info); return receive()[2]\n";
     script += "def floats(*values): return struct.pack('<16f', *values)\n";
     script += "inf, nan = float('inf'), float('nan')\n";
-    script += "receive()\n";
+    script += "first = receive()\n";
     start_program(script + what);
   }
 
