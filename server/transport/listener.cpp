@@ -55,7 +55,8 @@ Result<void> Listener::listen(const api::ListenPlace& place) {
     return make_error(ErrorKind::internal, "cannot listen on " + printable(place.address) +
                                                ": the address is not numeric");
   }
-  if (auto ok = place.socket < 0 ? bind_tcp(ip, place) : adopt(ip, place.socket); !ok) {
+  const auto protocol = asio::ip::tcp::endpoint(ip, 0).protocol();
+  if (auto ok = place.socket < 0 ? bind_tcp(ip, place) : adopt(protocol, place.socket); !ok) {
     return ok;
   }
   port_ = port_of(acceptor_.native_handle());
@@ -82,10 +83,9 @@ Result<void> Listener::bind_tcp(const asio::ip::address& ip, const api::ListenPl
                         (taken ? "; use port 0 for any free port" : ""));
 }
 
-Result<void> Listener::adopt(const asio::ip::address& ip, int socket) {
+Result<void> Listener::adopt(const Protocol& protocol, int socket) {
   ErrorCode fault;
-  const asio::ip::tcp::endpoint endpoint(ip, 0);
-  acceptor_.assign(endpoint.protocol(), socket, fault);
+  acceptor_.assign(protocol, socket, fault);
   if (!fault) acceptor_.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
   if (!fault) return {};
   return make_error(ErrorKind::internal,
@@ -93,6 +93,8 @@ Result<void> Listener::adopt(const asio::ip::address& ip, int socket) {
 }
 
 Result<void> Listener::listen_on_unix(const api::ListenPlace& place) {
+  path_ = place.path;
+  if (place.socket >= 0) return adopt(asio::local::stream_protocol(), place.socket);
   if (auto stale = remove_stale_socket(place.path); !stale) return stale;
   ErrorCode fault;
   acceptor_.open(asio::local::stream_protocol(), fault);
@@ -108,7 +110,7 @@ Result<void> Listener::listen_on_unix(const api::ListenPlace& place) {
 }
 
 std::string Listener::url(bool tls, const std::string& base_path) const {
-  if (port_ == 0) return unix_url(file_.path(), base_path);
+  if (port_ == 0) return unix_url(path_, base_path);
   return (tls ? "https://" : "http://") + host_ + ':' + std::to_string(port_) + base_path;
 }
 

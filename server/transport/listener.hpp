@@ -44,7 +44,7 @@ class Listener {
   using Acceptor = boost::asio::basic_socket_acceptor<boost::asio::generic::stream_protocol>;
 
   Result<void> bind_tcp(const boost::asio::ip::address& ip, const api::ListenPlace& place);
-  Result<void> adopt(const boost::asio::ip::address& ip, int socket);
+  Result<void> adopt(const Acceptor::protocol_type& protocol, int socket);
   Result<void> listen_on_unix(const api::ListenPlace& place);
   void accept();
 
@@ -53,7 +53,8 @@ class Listener {
   Acceptor acceptor_;
   boost::asio::steady_timer retry_;
   SpareDescriptor spare_;
-  UnixSocketFile file_;  // of a UNIX socket
+  UnixSocketFile file_;  // of a UNIX socket made here; the file of a passed one is not removed
+  std::string path_;     // of a UNIX socket
   std::string host_;     // of TCP, as in a URL
   std::uint16_t port_ = 0;
   // Held by the pending accept or retry timer: expires when an allocation failure destroys its

@@ -56,9 +56,14 @@ class Files(unittest.TestCase):
             path.write_text(re.sub(r"^ExecStart=\S+", f"ExecStart={PROGRAM}", unit, flags=re.M))
             drop_ins = pathlib.Path(folder) / "windsplat.service.d"
             drop_ins.mkdir()
-            for name in ("tls", "proxy"):
+            for name in ("tls", "proxy", "unix"):
                 shutil.copy(RECIPES / f"systemd-{name}.conf", drop_ins / f"{name}.conf")
-            run = subprocess.run(["systemd-analyze", "verify", "--man=no", path],
+            activator = path.with_suffix(".socket")
+            shutil.copy(ROOT / "deploy/windsplat.socket", activator)
+            activated = path.with_suffix(".socket.d")
+            activated.mkdir()
+            shutil.copy(RECIPES / "systemd-unix-socket.conf", activated / "unix.conf")
+            run = subprocess.run(["systemd-analyze", "verify", "--man=no", path, activator],
                                  capture_output=True, text=True, check=False)
         ours = [line for line in run.stderr.splitlines() if folder in line or "windsplat" in line]
         self.assertEqual((run.returncode, ours), (0, []), run.stderr)

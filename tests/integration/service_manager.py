@@ -12,6 +12,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import time
 import unittest
 import urllib.request
 
@@ -22,7 +23,8 @@ PATIENCE_S = 20
 class Manager:
     """Starts the daemon with the variables of a service manager."""
 
-    def __init__(self, folder, sockets=(), listen="127.0.0.1:0", pid="$$", **variables):
+    def __init__(self, folder, sockets=(), options="--listen 127.0.0.1:0", pid="$$",
+                 **variables):
         self.told = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         path = str(pathlib.Path(folder) / "notify")
         self.told.bind(path)
@@ -31,7 +33,7 @@ class Manager:
         numbers = [one.fileno() for one in sockets]
         # The shell puts the sockets at 3, 4, ... and becomes the daemon, so that its process is $$.
         moves = "".join(f" {3 + i}<&{number}" for i, number in enumerate(numbers))
-        line = f'LISTEN_PID={pid} exec "$0" serve climate --listen {listen}{moves}'
+        line = f'LISTEN_PID={pid} exec "$0" serve climate {options}{moves}'
         self.daemon = subprocess.Popen(["/bin/bash", "-c", line, PROGRAM], env=env, text=True,
                                        pass_fds=numbers, stdout=subprocess.PIPE,
                                        stderr=subprocess.PIPE)
@@ -65,11 +67,21 @@ def listening(address="127.0.0.1", family=socket.AF_INET):
     return high(made)
 
 
+def listening_at(path, kind=socket.SOCK_STREAM):
+    made = socket.socket(socket.AF_UNIX, kind)
+    made.bind(path)
+    made.listen()
+    return high(made)
+
+
 class UnderAManager(unittest.TestCase):
+    def folder(self):
+        made = tempfile.TemporaryDirectory()
+        self.addCleanup(made.cleanup)
+        return made.name
+
     def start(self, *sockets, **given):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        manager = Manager(folder.name, sockets, **given)
+        manager = Manager(self.folder(), sockets, **given)
         self.addCleanup(manager.close)
         for one in sockets:
             self.addCleanup(one.close)
@@ -110,6 +122,36 @@ class UnderAManager(unittest.TestCase):
         manager = self.start(passed)
         self.assertIn(f"serving http://[::1]:{port}/", manager.message())
 
+    def test_unix_sockets_are_taken_and_their_file_stays(self):
+        path = self.folder() + "/w.sock"
+        manager = self.start(listening_at(path))
+        self.assertEqual(manager.message(), "READY=1\nSTATUS=serving http+unix://"
+                                            + path.replace("/", "%2F") + "/")
+        with socket.socket(socket.AF_UNIX) as client:
+            client.settimeout(PATIENCE_S)
+            client.connect(path)
+            client.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            self.assertTrue(client.recv(4096).startswith(b"HTTP/1.1 200 "))
+        manager.daemon.send_signal(signal.SIGTERM)
+        self.assertEqual(manager.ended()[0], 0)
+        self.assertTrue(pathlib.Path(path).is_socket())
+
+    def test_reloads_are_told_whether_or_not_they_change_anything(self):
+        token = pathlib.Path(self.folder(), "token")
+        token.touch(0o600)
+        token.write_text("0123456789abcdef\n")
+        manager = self.start(options=f"--listen 127.0.0.1:0 --token-file {token}")
+        serving = manager.message()
+        refused = "; the last reload was refused: see the log"
+        for text, end in (("fedcba9876543210", ""), ("", refused), ("0123456789abcdef", "")):
+            token.write_text(text)
+            before_us = time.monotonic_ns() // 1000
+            manager.daemon.send_signal(signal.SIGHUP)
+            state, _, told_us = manager.message().partition("\nMONOTONIC_USEC=")
+            self.assertEqual(state, "RELOADING=1")
+            self.assertTrue(before_us <= int(told_us) <= time.monotonic_ns() // 1000)
+            self.assertEqual(manager.message(), serving + end)
+
     def test_no_watchdog_unless_asked_by_the_manager_of_this_process(self):
         manager = self.start(WATCHDOG_USEC="2000", WATCHDOG_PID="1")
         self.assertIn("READY=1", manager.message())
@@ -128,7 +170,7 @@ class UnderAManager(unittest.TestCase):
         self.assertIn("0.0.0.0:", log)
         self.assertIn("--token-file", log)
 
-    def test_other_than_one_listening_tcp_socket_is_refused(self):
+    def test_other_than_one_listening_socket_of_tcp_or_a_path_is_refused(self):
         code, log = self.start(listening(), listening()).ended()
         self.assertEqual(code, 2)
         self.assertIn("passed 2 sockets", log)
@@ -136,7 +178,9 @@ class UnderAManager(unittest.TestCase):
         datagrams = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         for one in (idle, datagrams):
             one.bind(("127.0.0.1", 0))
-        for one in (idle, datagrams):
+        abstract = listening_at(f"\0windsplat-{os.getpid()}")
+        packets = listening_at(self.folder() + "/p.sock", socket.SOCK_SEQPACKET)
+        for one in (idle, datagrams, abstract, packets):
             code, log = self.start(high(one)).ended()
             self.assertEqual(code, 2)
             self.assertIn("not a listening TCP socket", log)

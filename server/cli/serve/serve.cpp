@@ -64,6 +64,7 @@ class Control {
     store_ = std::move(store);
     started_ = std::move(started);
     tls_ = started_->options.tls;
+    serving_ = "serving " + server.url();
     while (true) {
       {
         const std::lock_guard lock(mutex_);
@@ -86,6 +87,7 @@ class Control {
     const std::lock_guard lock(mutex_);
     if (server_ == nullptr) _exit(exit_ok);
     log::info("draining");  // log it before the drain can complete
+    draining_ = true;
     manager_->stopping();
     server_->drain();
   }
@@ -97,24 +99,29 @@ class Control {
       reload_wanted_ = server_ == nullptr;
       if (reload_wanted_) return;
     }
-    reload_now([this](transport::Access access) {
+    manager_->reloading();
+    const bool reloaded = reload_now([this](transport::Access access) {
       const std::lock_guard lock(mutex_);
       if (server_ != nullptr) server_->change(std::move(access));
     });
+    const std::lock_guard lock(mutex_);
+    if (draining_) return;  // the manager must not take it for running again
+    manager_->ready(reloaded ? serving_ : serving_ + "; the last reload was refused: see the log");
   }
 
  private:
-  // All or nothing, even when memory or threads run out.
-  void reload_now(const std::function<void(transport::Access)>& change) {
+  // All or nothing, even when memory or threads run out. False: nothing.
+  bool reload_now(const std::function<void(transport::Access)>& change) {
     try {
-      take_over(change);
+      return take_over(change);
     } catch (const std::exception& fault) {
       log::error("the configuration is unchanged", {{"fault", fault.what()}});
+      return false;
     }
   }
 
   // May block on a disk, so only `change` takes the lock.
-  void take_over(const std::function<void(transport::Access)>& change) {
+  bool take_over(const std::function<void(transport::Access)>& change) {
     const auto fresh = read_settings(given_, *manager_);
     if (!fresh) return refuse(fresh.error());
     const ServeSettings& settings = **fresh;
@@ -140,10 +147,12 @@ class Control {
     configure_log(settings.arguments);
     store_->try_failed_again();
     log::info("configuration reloaded");
+    return true;
   }
 
-  static void refuse(const Error& error) {
+  static bool refuse(const Error& error) {
     log::error("the configuration is unchanged", {{"fault", error.message}});
+    return false;
   }
 
   const CLI::App& given_;
@@ -151,9 +160,11 @@ class Control {
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
   std::shared_ptr<transport::TlsContext> tls_;  // the newest one
+  std::string serving_;                         // the state in words
   std::mutex mutex_;                            // guards the members below, held briefly
   transport::Server* server_ = nullptr;
   bool reload_wanted_ = false;
+  bool draining_ = false;
 };
 
 // Reject a dataset whose default fields cannot be loaded: every frame of it would fail.

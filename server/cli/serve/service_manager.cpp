@@ -6,6 +6,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -43,7 +44,15 @@ std::optional<std::int64_t> number(const std::string& text) {
   return value;
 }
 
-// "ADDRESS:PORT" of a bound socket; empty if it is none of TCP.
+// The path of a UNIX socket, as of --listen; empty if it has none: an abstract name has no mode, so
+// that every user of the machine may connect.
+std::string unix_address(const sockaddr_un& name, socklen_t size) {
+  constexpr std::size_t start = offsetof(sockaddr_un, sun_path);
+  if (size <= start || name.sun_path[0] != '/') return {};
+  return "unix:" + std::string(name.sun_path, ::strnlen(name.sun_path, size - start));
+}
+
+// "ADDRESS:PORT" or "unix:PATH" of a bound socket; empty if it is none of these.
 std::string address_of(int socket) {
   sockaddr_storage name{};
   socklen_t size = sizeof name;
@@ -59,6 +68,7 @@ std::string address_of(int socket) {
     ::inet_ntop(AF_INET6, &v6.sin6_addr, text.data(), text.size());
     return '[' + std::string(text.data()) + "]:" + std::to_string(ntohs(v6.sin6_port));
   }
+  if (name.ss_family == AF_UNIX) return unix_address(reinterpret_cast<sockaddr_un&>(name), size);
   return {};
 }
 
@@ -84,7 +94,8 @@ Result<std::optional<PassedSocket>> passed_socket() {
       !has_option(first_passed, SO_ACCEPTCONN, 1)) {
     return make_error(ErrorKind::invalid,
                       "the socket of the service manager (descriptor 3) is not a listening TCP "
-                      "socket: ListenStream=ADDRESS:PORT and Accept=no are needed");
+                      "socket or UNIX socket with a path: ListenStream=ADDRESS:PORT or "
+                      "ListenStream=/PATH, and Accept=no are needed");
   }
   ::fcntl(first_passed, F_SETFD, FD_CLOEXEC);
   return std::optional(PassedSocket{first_passed, address});
@@ -145,6 +156,13 @@ void ServiceManager::tell(const std::string& text, int flags) const {
 
 void ServiceManager::ready(std::string_view status) const {
   tell("READY=1\nSTATUS=" + std::string(status), 0);
+}
+
+void ServiceManager::reloading() const {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  const auto us = std::int64_t{now.tv_sec} * 1'000'000 + now.tv_nsec / 1000;
+  tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(us), 0);
 }
 
 void ServiceManager::stopping() const { tell("STOPPING=1", 0); }

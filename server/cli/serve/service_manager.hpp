@@ -14,15 +14,15 @@
 namespace windsplat::cli {
 
 struct PassedSocket {
-  int descriptor = -1;  // a listening TCP socket, closed on exec
-  std::string address;  // as of --listen: "127.0.0.1:8080", "[::1]:8080"
+  int descriptor = -1;  // a listening TCP or UNIX socket, closed on exec
+  std::string address;  // as of --listen: "127.0.0.1:8080", "[::1]:8080", "unix:/run/w.sock"
 };
 
 class ServiceManager {
  public:
   // Reads the variables and removes them from the environment: call it before threads start.
   // Variables meant for another process are ignored. Errors: invalid, if other than one listening
-  // TCP socket was passed.
+  // socket of TCP, or of a UNIX path, was passed.
   static Result<std::shared_ptr<const ServiceManager>> from_environment();
   ~ServiceManager();
   ServiceManager(const ServiceManager&) = delete;
@@ -35,6 +35,7 @@ class ServiceManager {
 
   // No effect without a manager that listens. They may be called from any thread.
   void ready(std::string_view status) const;
+  void reloading() const;  // until ready() is called again
   void stopping() const;
   void alive() const;
 
