@@ -18,11 +18,14 @@ namespace {
 
 constexpr int legend_colors = 64;
 
+// A page of an origin that is not allowed cannot read the answer, but learns that there is one, so
+// that it can tell a server that is down from one that refuses the page.
 http::Response health(int status, const char* state) {
   http::Response response;
   response.status = status;
   response.content_type = "application/json";
-  response.headers = {{"Cache-Control", "no-store"}};
+  response.headers = {{"Cache-Control", "no-store"},
+                      {"Cross-Origin-Resource-Policy", "cross-origin"}};
   response.body = http::Body::of(protocol::encode_health(state));
   return response;
 }

@@ -20,7 +20,7 @@ constexpr int gzip_window = 15 + 16;                 // zlib: the largest window
 bool is_text(std::string_view content_type) {
   const std::string_view type = split_list(content_type, ';')[0];
   return type.starts_with("text/") || type == "application/json" ||
-         (type.starts_with("application/") && type.ends_with("+json"));
+         (type.starts_with("application/") && type.ends_with("+json")) || type == "image/svg+xml";
 }
 
 std::string coding_of(const Request& request) { return request.header("Content-Encoding"); }
@@ -108,12 +108,12 @@ Result<std::string> ungzip(std::string_view bytes, std::size_t bytes_max) {
   }
   const bool rest = stream.avail_in > 0;
   inflateEnd(&stream);
+  if (state != Z_OK && state != Z_STREAM_END) {
+    return make_error(ErrorKind::malformed, "the body is not gzip, or is damaged or cut short");
+  }
   if (out.size() > bytes_max) {
     return make_error(ErrorKind::too_large,
                       "the body is larger than " + std::to_string(bytes_max) + " bytes unpacked");
-  }
-  if (state != Z_STREAM_END) {
-    return make_error(ErrorKind::malformed, "the body is not gzip, or is damaged or cut short");
   }
   if (rest) return make_error(ErrorKind::malformed, "bytes follow the end of the gzip body");
   return out;

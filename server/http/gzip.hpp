@@ -11,8 +11,9 @@
 
 namespace windsplat::http {
 
-// Whether the answer is text that is sent compressed to clients that accept it: JSON, HTML or other
-// text of at least 1 KiB, without a content coding of its own. Pictures are compressed already.
+// Whether the answer is text that is sent compressed to clients that accept it: JSON, HTML, SVG or
+// other text of at least 1 KiB, without a content coding of its own. Other pictures are compressed
+// already.
 bool is_compressible(const Response& response);
 
 // Replaces the body by its gzip form, with Content-Encoding and an ETag of its own; unchanged if

@@ -15,6 +15,12 @@ Answer picture(MediaTypes media) {
           {"ETag", "Server-Timing", "Windsplat-Frame", "Vary"}};
 }
 
+Answer unchanged_picture() {
+  Answer out = not_modified();
+  out.headers.push_back("Vary");
+  return out;
+}
+
 struct FormatWords {
   std::string_view dataset_id;
   std::string_view view_id;
@@ -49,7 +55,7 @@ Operation draw_address(frame::Format format) {
                           parameters::elevation, parameters::zoom, parameters::step,
                           parameters::time, parameters::nearest, parameters::drawn_fields,
                           parameters::color_map, parameters::annotate, parameters::preset},
-                .answers = {picture({words_of(format).media}), not_modified()},
+                .answers = {picture({words_of(format).media}), unchanged_picture()},
                 .problems = {404, 413, 422, 507}};
   if (format == frame::Format::jpeg) {
     out.query.push_back(parameters::quality);
@@ -70,7 +76,7 @@ Operation draw_view() {
           .body = view_body("The view, which names its dataset."),
           .answers = {picture({"image/jpeg", "image/png", "application/x-npy", "application/pdf",
                                "image/svg+xml"}),
-                      not_modified()},
+                      unchanged_picture()},
           .problems = {404, 406, 422, 507}};
 }
 

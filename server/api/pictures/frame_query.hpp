@@ -31,6 +31,7 @@ struct Picture {
   std::string preset;  // empty: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
+  std::string accept_encoding;
   frame::Cost cost;  // cost of the view before preset and orbit, which change only the camera
 };
 

@@ -10,6 +10,8 @@
 #include "server/api/pictures/frame_query.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/frame_info.hpp"
+#include "server/http/cors.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
@@ -146,8 +148,18 @@ Result<tasks::PreparedPtr> prepare_limited(tasks::Backend& backend,
   return picture;
 }
 
-http::Response unchanged_response(const std::string& etag) {
-  return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
+// Of pictures and of 304, whose headers replace those of the picture that the client has.
+void add_picture_headers(frame::Format format, http::Response& response) {
+  response.headers.emplace_back("Vary", "Accept");
+  if (format == frame::Format::svg) http::add_vary(response, "Accept-Encoding");
+  // Other sites may embed a picture by <img>, but cannot read its pixels.
+  response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
+}
+
+http::Response unchanged_response(const std::string& etag, frame::Format format) {
+  http::Response response{304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
+  add_picture_headers(format, response);
+  return response;
 }
 
 // Null if the client has the picture already: `reply` is called with 304. Its tag identifies the
@@ -164,8 +176,8 @@ Result<tasks::PreparedPtr> prepare(tasks::Backend& backend, const Picture& pictu
   const protocol::View& view = completed->view();
   if (!is_chosen(view)) {
     const std::string etag = picture_etag(view, dataset, picture.encoding);
-    if (http::matches_etag(picture.if_none_match, etag)) {
-      reply(unchanged_response(etag));
+    if (const auto known = http::known_etag(picture.if_none_match, picture.accept_encoding, etag)) {
+      reply(unchanged_response(*known, picture.encoding.format));
       return tasks::PreparedPtr();
     }
   }
@@ -212,9 +224,7 @@ Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,
                                     ", render;dur=" + milliseconds(drawn->render_us) +
                                     ", encode;dur=" + milliseconds(drawn->encode_us));
   response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
-  response.headers.emplace_back("Vary", "Accept");
-  // Other sites may embed a picture by <img>, but cannot read its pixels.
-  response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
+  add_picture_headers(picture.encoding.format, response);
   response.body = http::Body::of(std::move(drawn->bytes));
   return response;
 }
@@ -233,6 +243,7 @@ void submit_picture(tasks::Backend& backend, access::Admission& admission, Pictu
     return;
   }
   asked.if_none_match = request.header("If-None-Match");
+  asked.accept_encoding = request.header("Accept-Encoding");
   const auto picture = std::make_shared<const Picture>(std::move(asked));
   const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;

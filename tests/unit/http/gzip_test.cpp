@@ -63,8 +63,13 @@ TEST(Gzip, UnpackingStopsAtTheLimit) {
   Response zeros = gzip_answer("text/plain", std::size_t{10} << 20);
   compress(zeros);
   ASSERT_LT(zeros.body.bytes.size(), 20000U);
-  EXPECT_EQ(ungzip(gzip_text(zeros), 65536).error().kind, ErrorKind::too_large);
-  EXPECT_EQ(ungzip(gzip_text(zeros), std::size_t{10} << 20).value().size(), std::size_t{10} << 20);
+  std::string packed = gzip_text(zeros);
+  EXPECT_EQ(ungzip(packed, 65536).error().kind, ErrorKind::too_large);
+  EXPECT_EQ(ungzip(packed, std::size_t{10} << 20).value().size(), std::size_t{10} << 20);
+  // A damaged end is not met before the limit.
+  packed.back() ^= 1;
+  EXPECT_EQ(ungzip(packed, 65536).error().kind, ErrorKind::too_large);
+  EXPECT_EQ(ungzip(packed, std::size_t{10} << 20).error().kind, ErrorKind::malformed);
 }
 
 TEST(Gzip, IsForLargerTextOnly) {

@@ -89,6 +89,37 @@ TEST(Compression, EachFormHasItsTagAndEitherPermitsAChange) {
   }
 }
 
+// SVG is text. Browsers keep the headers of a 304, so it has those of the picture.
+TEST(Compression, PicturesOfTextHaveATagForEachFormAndThoseOfBytesNone) {
+  const TestServer server;
+  const std::string target = "/v1/datasets/small/frame.svg?width=64&height=64";
+  const Answer plain = get(server.port(), target);
+  ASSERT_EQ(plain.status, 200) << plain.body;
+  EXPECT_EQ(plain.header("content-encoding"), "");
+  const Answer packed = get(server.port(), target, accepts_zipped);
+  EXPECT_EQ(packed.header("content-encoding"), "gzip");
+  EXPECT_EQ(packed.header("etag"), windsplat::http::gzip_etag(plain.header("etag")));
+  EXPECT_EQ(ungzip(packed.body, plain.body.size()).value(), plain.body);
+  for (const Answer* const form : {&plain, &packed}) {
+    Headers asked = accepts_zipped;
+    asked.emplace_back("If-None-Match", form->header("etag"));
+    const Answer known = get(server.port(), target, asked);
+    EXPECT_EQ(known.status, 304);
+    for (const char* const name : {"etag", "vary", "cache-control", "cross-origin-resource-policy"})
+      EXPECT_EQ(known.header(name), form->header(name)) << name;
+    EXPECT_EQ(known.header("vary"), "Accept, Accept-Encoding");
+  }
+  EXPECT_EQ(get(server.port(), target, {{"If-None-Match", packed.header("etag")}}).status, 200)
+      << "it could not read that form";
+  const std::string bytes = "/v1/datasets/small/frame.png?width=64&height=64";
+  const Answer png = get(server.port(), bytes, accepts_zipped);
+  const Answer known = get(server.port(), bytes, {{"If-None-Match", png.header("etag")}});
+  EXPECT_EQ(known.status, 304);
+  EXPECT_EQ(png.header("vary"), "Accept");
+  EXPECT_EQ(known.header("vary"), "Accept");
+  EXPECT_EQ(known.header("cross-origin-resource-policy"), "cross-origin");
+}
+
 TEST(Compression, RequestBodiesMayBeGzip) {
   const TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":16,"height":16}})";

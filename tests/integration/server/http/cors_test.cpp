@@ -46,6 +46,17 @@ void expect_shared(const Answer& answer, const std::string& what) {
   }
 }
 
+// They tell a server that is down from one that refuses them.
+TEST(CrossOrigin, PagesOfAnyOriginLearnThatHealthIsAnsweredAndNotWhatItSays) {
+  const TestServer server(cors_options());
+  for (const char* const target : {"/livez", "/readyz"}) {
+    const Answer answer = get(server.port(), target, cors_from("https://stranger.example"));
+    EXPECT_EQ(answer.status, 200) << target;
+    EXPECT_EQ(answer.header("cross-origin-resource-policy"), "cross-origin") << target;
+    EXPECT_EQ(answer.header("access-control-allow-origin"), "") << target;
+  }
+}
+
 TEST(CrossOrigin, APreflightOfAListedOriginIsAnsweredBeforeAuthentication) {
   const TestServer server(cors_options());
   for (const char* const target : {"/v1/frames", "/v1/views/x", "/unknown"}) {
