@@ -236,6 +236,17 @@ test("a server that refuses streams but answers is tried less and less often", a
   assert.deepEqual(delays, [1250, 2500, 5000, 10_000, 12_500, 12_500]);
 });
 
+test("one that refuses the page, as a proxy without its server may, is tried on", async () => {
+  const { clock, connection, last, sockets } = setUp(() => "foreign");
+  connection.start();
+  for (let n = 0; n < 6; n++) {
+    last().dies();
+    await settled();
+    clock.advance(2000);
+    assert.equal(sockets.length, n + 2);
+  }
+});
+
 test("a server that asks for a token is not tried until the user has logged in", async () => {
   for (const code of [1006, 1008]) {
     const { clock, connection, last, sockets, state } = setUp(() => "login");

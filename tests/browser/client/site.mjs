@@ -15,10 +15,11 @@ export function buildPackage(folder) {
   execFileSync(process.execPath, [script, "--no-types", "--dist", folder], { stdio: "inherit" });
 }
 
-// Serves the package below /client/, and `html` at every other address.
+// Serves the package below /client/, and `html` at every other address with `headers`.
 class Site {
   html = "";
   css = "";
+  headers = {};
 
   async start() {
     this.folder = mkdtempSync(join(tmpdir(), "windsplat-site-"));
@@ -36,6 +37,7 @@ class Site {
         "Content-Security-Policy",
         "default-src 'self'; script-src 'self' 'unsafe-inline'; connect-src *",
       );
+      for (const one of Object.entries(this.headers)) response.setHeader(...one);
       response.end(name === undefined ? this.html : readFileSync(join(this.folder, name)));
     });
     await new Promise((listens) => this.server.listen(0, "127.0.0.1", listens));
@@ -76,10 +78,10 @@ export function sharedSite({ args = ["tornado"], allowed = true } = {}) {
   });
 
   // Opens a page of the site; it is closed when the test ends. defined: whether it defines the
-  // element; body: HTML in which SRC is the address of the daemon. Events of the elements are
-  // collected in window.told.
-  async function pageWith(t, body, { css = small, defined = true, ...options } = {}) {
-    shared.site.css = css;
+  // element; headers: of the page; body: HTML in which SRC is the address of the daemon. Events of
+  // the elements are collected in window.told.
+  async function pageWith(t, body, { css = small, defined = true, headers = {}, ...options } = {}) {
+    Object.assign(shared.site, { css, headers });
     shared.site.html = `${head}<script>
       window.told = [];
       for (const name of ["frame", "view", "error", "pick"]) {

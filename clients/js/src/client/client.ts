@@ -16,6 +16,7 @@ import { addressOf, settingsOf } from "../wire/arguments";
 import type { SocketClass } from "../wire/browser_link";
 import { drawFrame, waitFor, type FetchLike, type Wait } from "../wire/frame_request";
 import type { View } from "../wire/protocol";
+import { isForeign } from "../wire/reach";
 import { posted, ProblemError, problemText, UnreachableError } from "../wire/requests";
 import { ViewStream, type StreamEvents, type StreamOptions } from "./view_stream";
 
@@ -63,7 +64,7 @@ const reaching =
       return await fetch(url, init);
     } catch (failure) {
       if (init.signal?.aborted) throw failure;
-      throw new UnreachableError(address, failure);
+      throw new UnreachableError(address, failure, await isForeign(fetch, address));
     }
   };
 

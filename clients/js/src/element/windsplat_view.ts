@@ -1,7 +1,7 @@
 // <windsplat-view src="https://your.host/" dataset="winds">: a live picture of a view in any page.
 import { Client } from "../client/client";
 import { isOfDataset } from "../client/opener";
-import { failureText, ProblemError } from "../wire/requests";
+import { failureText, ownOrigin, ProblemError, refusesPages } from "../wire/requests";
 import type { Camera } from "../view/camera";
 import { zoom } from "../view/camera";
 import { pixelAt, withoutSize } from "../view/picture_size";
@@ -363,21 +363,12 @@ export class WindsplatView extends Base {
     if (state.name === "waiting" && state.attempt > 1) this.lost("silent", state.reason);
   }
 
-  // Browsers do not tell a page why another origin refused it.
   private lost(reach: Reach, reason: string): void {
     if (reach === "login") return; // the next state tells
     const { origin } = new URL(this.src);
-    const here = window.location.origin;
-    if (reach === "answers" || origin === here) {
-      this.outage("connection", reason);
-      return;
-    }
-    const ofToken = this.secret === undefined ? "asks for a token" : "refuses this token";
-    this.outage(
-      "connection",
-      `no stream from ${origin}: the server cannot be reached, ` +
-        `does not allow pages of ${here} (--allow-origin), or ${ofToken}`,
-    );
+    if (reach === "foreign") this.outage("connection", refusesPages(origin));
+    else if (reach === "answers" || origin === ownOrigin()) this.outage("connection", reason);
+    else this.outage("connection", `no answer from ${origin}`);
   }
 
   private outage(kind: ErrorKind, message: string): void {

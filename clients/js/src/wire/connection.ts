@@ -262,7 +262,7 @@ export class Connection {
   // A browser does not say why a stream could not be opened; the server's answer to another request
   // shows whether it asks for a token, or refuses streams for another reason.
   private reached(reach: Reach, counted: boolean, reason: string): void {
-    if (reach === "silent" || (reach === "answers" && counted)) return;
+    if (reach === "silent" || reach === "foreign" || (reach === "answers" && counted)) return;
     this.clearTimers();
     if (reach === "login") {
       this.locked = true;

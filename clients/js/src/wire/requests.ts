@@ -17,18 +17,33 @@ export class ProblemError extends Error {
   }
 }
 
-/** A request had no answer: the server is down, its address is wrong, or a browser forbids it. */
+/**
+ * A request had no answer that this program may read: the server is down or its address is wrong,
+ * or, if `foreign`, it does not allow pages of this origin.
+ */
 export class UnreachableError extends Error {
   override name = "UnreachableError";
 
   constructor(
     readonly address: string, // of the server
     override readonly cause: unknown, // the failure as it was reported
+    readonly foreign = false,
   ) {
     const { message, cause: reason } = cause as { message?: string; cause?: { code?: string } };
-    super(`no answer from ${address} (${reason?.code ?? message ?? String(cause)})`);
+    const silent = `no answer from ${address} (${reason?.code ?? message ?? String(cause)})`;
+    super(foreign ? refusesPages(address) : silent);
   }
 }
+
+/**
+ * The origin of this page as servers see it, which `location` does not have in a frame without an
+ * address (srcdoc); undefined outside of browsers.
+ */
+export const ownOrigin = (): string | undefined => (globalThis as { origin?: string }).origin;
+
+/** Text on a server that does not allow pages of the origin of this one. */
+export const refusesPages = (server: string): string =>
+  `${server} answers, but does not allow pages of ${ownOrigin()} (--allow-origin)`;
 
 /** The entries of a problem with their places, or else its detail or title. */
 export function problemText({ title, detail, errors }: Problem): string {
