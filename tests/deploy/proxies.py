@@ -93,18 +93,20 @@ def password_hash(server):
 
 
 class Proxy:
-    """The server with its recipe, unprivileged, in front of the daemon at `upstream`; `logins`: the
-    port of what stands in for oauth2-proxy; `more`: a line beside that for Authorization."""
+    """The server with its recipe, unprivileged, in front of the daemon at `upstream`: a port, or
+    the words that the page has for a UNIX socket; `logins`: the port of what stands in for
+    oauth2-proxy; `more`: a line beside that for Authorization."""
 
     def __init__(self, server, folder, upstream, recipe, logins=None, more=""):
         self.port = free_port()
         chain, key = folder / "chain.pem", folder / "key.pem"
         if not chain.exists():
-            subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes",
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-nodes",
+                            "-pkeyopt", "ec_paramgen_curve:prime256v1",
                             "-days", "2", "-subj", f"/CN={NAME}",
                             "-addext", f"subjectAltName=DNS:{NAME}",
                             "-keyout", key, "-out", chain], check=True, capture_output=True)
-        daemon = f"127.0.0.1:{upstream}"
+        daemon = upstream if isinstance(upstream, str) else f"127.0.0.1:{upstream}"
         if server == "nginx":
             replacements = {
                 "server 127.0.0.1:8080;": f"server {daemon};",
@@ -218,11 +220,11 @@ def options_of(recipe):
     return words[2:]
 
 
-def start_daemon(case, recipe):
-    """The daemon as the recipe says, with a low limit of requests, and the file of its log."""
+def start_daemon(case, options):
+    """The daemon with the options of a recipe, a low limit of requests, and the file of its log."""
     log = tempfile.NamedTemporaryFile("w+", prefix="windsplat-proxy-", suffix=".log")
     case.addClassCleanup(log.close)
-    daemon = Daemon(OPTIONS.program, "tornado:32", *options_of(recipe),
+    daemon = Daemon(OPTIONS.program, "tornado:32", *options,
                     f"--max-requests-per-address={REQUESTS_A_SECOND}", errors=log)
     case.addClassCleanup(daemon.stop)
     case.addClassCleanup(daemon.child.stdout.close)
@@ -257,11 +259,19 @@ class Recipe(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.daemon, cls.log = start_daemon(cls, recipe_of_server())
-        temporary, folder = folder_of_test("daemon")
+        temporary, cls.folder = folder_of_test("daemon")
         cls.addClassCleanup(temporary.cleanup)
-        cls.proxy = Proxy(OPTIONS.server, folder, cls.daemon.port, recipe_of_server())
+        cls.daemon, cls.log = start_daemon(cls, cls.options())
+        cls.proxy = Proxy(OPTIONS.server, cls.folder, cls.upstream(), recipe_of_server())
         cls.addClassCleanup(cls.proxy.stop)
+
+    @classmethod
+    def options(cls):
+        return options_of(recipe_of_server())
+
+    @classmethod
+    def upstream(cls):
+        return cls.daemon.port
 
     def test_serves_the_page_and_its_files_below_the_path(self):
         visitor = Visitor(self.proxy)
@@ -348,6 +358,27 @@ class Recipe(unittest.TestCase):
         self.assertNotIn("192.0.2.", self.log.read_text())
 
 
+class OnASocket(Recipe):
+    """The same over a UNIX socket, as the page tells it."""
+
+    PATH = "/run/windsplat/windsplat.sock"
+
+    @classmethod
+    def options(cls):
+        page = (RECIPES / "proxies.md").read_text().replace("\\\n", " ")
+        words = re.search(rf"windsplat serve winds\.nc (--listen unix:{cls.PATH} .*)", page)[1]
+        own = words.replace(cls.PATH, str(cls.folder.parent / "daemon.sock")).split()
+        assert "--listen-mode" not in own, "the default is 0660"
+        return [*own, "--listen-mode=0666"]  # here the proxy is in no group of the daemon's user
+
+    @classmethod
+    def upstream(cls):
+        page = (RECIPES / "proxies.md").read_text()
+        line, = re.findall(rf"^\| {recipe_of_server()} \| `(.*unix.*)` \|$", page, re.M)
+        line = line.replace(cls.PATH, str(cls.folder.parent / "daemon.sock"))
+        return re.fullmatch(r"(?:server|reverse_proxy) (.+?)(?:;| \{)", line)[1]
+
+
 class Forwarded(unittest.TestCase):
     """What arrives behind the proxy."""
 
@@ -420,7 +451,7 @@ class Users(unittest.TestCase):
         threading.Thread(target=logins.serve_forever, daemon=True).start()
         cls.addClassCleanup(logins.server_close)
         cls.addClassCleanup(logins.shutdown)
-        cls.daemon, cls.log = start_daemon(cls, OAUTH_RECIPE)
+        cls.daemon, cls.log = start_daemon(cls, options_of(OAUTH_RECIPE))
         temporary, folder = folder_of_test("users")
         cls.addClassCleanup(temporary.cleanup)
         cls.proxy = Proxy("nginx", folder, cls.daemon.port, OAUTH_RECIPE, logins.server_port)
