@@ -94,6 +94,18 @@ def operation(document, method, path, shared, one, common):
     return out + table([row for row in answers(document, one) if row not in common])
 
 
+def schema_section(schemas):
+    out = ["## Schemas", ""] if schemas else []
+    for name, schema in schemas.items():
+        out += [f"### {name} {{#schema-{name}}}", "", "```json", json.dumps(schema, indent=1),
+                "```", ""]
+    return out
+
+
+def joined(lines):
+    return "\n".join(lines).rstrip() + "\n"
+
+
 def page(document):
     """The whole page: the operations by tag, in the document's order."""
     info = document.get("info", {})
@@ -113,9 +125,4 @@ def page(document):
         groups.setdefault(tag, []).extend(operation(document, method, path, shared, one, common))
     for tag, lines in groups.items():
         out += [f"## {tag[:1].upper()}{tag[1:]}", "", *lines]
-    schemas = document.get("components", {}).get("schemas", {})
-    out += ["## Schemas", ""] if schemas else []
-    for name, schema in schemas.items():
-        out += [f"### {name} {{#schema-{name}}}", "", "```json", json.dumps(schema, indent=1),
-                "```", ""]
-    return "\n".join(out).rstrip() + "\n"
+    return joined([*out, *schema_section(document.get("components", {}).get("schemas", {}))])

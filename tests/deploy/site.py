@@ -14,6 +14,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(ROOT / "scripts/site_parts"), str(ROOT / "tests/tidy")]
+import asyncapi  # noqa: E402
 import links  # noqa: E402
 import navigation  # noqa: E402
 import openapi  # noqa: E402
@@ -41,6 +42,23 @@ OPENAPI = {
                               "schema": {"enum": ["a", "b"]}}},
         "responses": {"none": {"description": "there is none"}},
         "schemas": {"Field": {"type": "object"}}}}
+
+ASYNCAPI = {
+    "asyncapi": "3.0.0", "info": {"title": "t", "version": "1.2.3", "description": "All of it."},
+    "operations": {"send": {"title": "Of the server", "description": "`hello` is first.",
+                            "messages": [{"$ref": "#/channels/stream/messages/hello"},
+                                         {"$ref": "#/channels/stream/messages/frame"}]}},
+    "components": {
+        "messages": {
+            "hello": {"summary": "The first one.", "contentType": "application/json",
+                      "payload": {"$ref": "#/components/schemas/Hello"}},
+            "frame": {"summary": "A picture", "contentType": "application/octet-stream",
+                      "payload": {"type": "string", "description": "Header, then bytes."}}},
+        "schemas": {
+            "Hello": {"type": "object"},
+            "FrameHeader": {"properties": {
+                "width": {"x-offset": 12, "x-encoding": "u16", "description": "pixels | columns"},
+                "magic": {"x-offset": 0, "x-encoding": "u32", "description": "WSPL"}}}}}}
 
 SERVER = """import http.server, pathlib
 class Handler(http.server.BaseHTTPRequestHandler):
@@ -184,6 +202,19 @@ class Rest(unittest.TestCase):
             self.assertEqual(openapi.type_of(schema), words)
 
 
+class Stream(unittest.TestCase):
+    def test_the_page_tells_messages_header_and_schemas(self):
+        text = asyncapi.page(ASYNCAPI)
+        for words in ("# Stream reference\n\nVersion 1.2.3", "All of it.",
+                      "## Of the server\n\n`hello` is first.\n",
+                      "### hello {#message-hello}\n\nThe first one.\n\n"
+                      "`application/json`: [Hello](#schema-Hello).\n",
+                      "A picture.\n\n`application/octet-stream`: string.\n\nHeader, then bytes.",
+                      "| 0 | u32 | `magic` | WSPL |\n| 12 | u16 | `width` | pixels \\| columns |",
+                      '### Hello {#schema-Hello}\n\n```json\n{\n "type"'):
+            self.assertIn(words, text)
+
+
 class Site(Folder):
     def test_documents_of_the_project_can_be_gathered(self):
         titles = sources.gather(ROOT, self.root / "out")
@@ -192,7 +223,7 @@ class Site(Folder):
 
     def build(self, *options, program=None):
         if not shutil.which("mkdocs"):
-            self.skipTest("mkdocs is not installed (scripts/setup site)")
+            self.skipTest("mkdocs is not installed (scripts/setup test)")
         output = self.root / "site"
         run = subprocess.run([ROOT / "scripts/site", f"--program={program or PROGRAM}",
                               f"--output={output}", *options],
@@ -212,14 +243,19 @@ class Site(Folder):
         self.assertIn(f"{DOCS}/user/formats.html#staggered-grids",
                       [one["location"] for one in index])
 
-    def test_has_a_reference_of_what_the_program_serves(self):
+    def test_has_references_of_what_the_program_serves(self):
         self.write("openapi.json", json.dumps(OPENAPI))
+        self.write("asyncapi.json", json.dumps(ASYNCAPI))
         self.write("program", f"#!{sys.executable}\n{SERVER}".replace("FOLDER", str(self.root)))
         (self.root / "program").chmod(0o755)
         output = self.build(program=self.root / "program")
         page = html.unescape((output / "reference/rest.html").read_text())
         self.assertIn("GET /v1/fields/{id}</h3>", page)
         self.assertEqual(json.loads((output / "reference/openapi.json").read_text()), OPENAPI)
+        page = html.unescape((output / "reference/stream.html").read_text())
+        self.assertIn('id="message-hello"', page)
+        self.assertIn('href="reference/stream.html"', (output / "index.html").read_text())
+        self.assertEqual(json.loads((output / "reference/asyncapi.json").read_text()), ASYNCAPI)
 
     def test_headers_of_the_library_get_a_reference(self):
         if not shutil.which("doxygen"):
@@ -233,7 +269,7 @@ class Site(Folder):
     def test_a_folder_that_is_no_site_is_left_alone(self):
         self.write("site/precious", "data")
         if not shutil.which("mkdocs"):
-            self.skipTest("mkdocs is not installed (scripts/setup site)")
+            self.skipTest("mkdocs is not installed (scripts/setup test)")
         run = subprocess.run([ROOT / "scripts/site", f"--output={self.root / 'site'}"],
                              capture_output=True, text=True, check=False)
         self.assertEqual((run.returncode, "is not a site" in run.stderr), (1, True), run.stderr)
