@@ -68,7 +68,7 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(values ${SYSTEM_PYTHON} tests/integration/values.py
     --program=$<TARGET_FILE:windsplat>)
-  windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi_requests.py
+  windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi/openapi_requests.py
     --program=$<TARGET_FILE:windsplat> --count=600)
   windsplat_program_test(uploads ${SYSTEM_PYTHON} tests/integration/uploads.py
     --program=$<TARGET_FILE:windsplat>)
@@ -153,7 +153,7 @@ if(WINDSPLAT_SANITIZE)
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=300)
 else()
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=10000)
-  windsplat_long_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi_requests.py
+  windsplat_long_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi/openapi_requests.py
     --count=10000 --seed=1)
   windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
   windsplat_long_test(tutorial python3 tests/deploy/tutorial.py)
