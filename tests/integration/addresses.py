@@ -307,7 +307,7 @@ class Probes(unittest.TestCase):
                             ("lon=0&lat=0&level=700&heightField=t", "'level'"),
                             ("lon=0&level=700", "'lat' is required beside 'lon'"),
                             ("lat=0&level=700", "'lon' is required beside 'lat'"),
-                            ("x=0&z=700", "y is required")):
+                            ("x=0&z=700", "y (or lat) is required")):
             status, detail = self.probe("globe", query).detail()
             self.assertEqual(status, 422, query)
             self.assertIn(text, detail)

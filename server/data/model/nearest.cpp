@@ -21,7 +21,9 @@ constexpr double turn = 360;
 constexpr double radians_per_degree = 3.14159265358979323846 / 180;
 // Relative to the size of the box: a computed position may miss the edge by rounding.
 constexpr double edge_tolerance = 1e-6;
-constexpr std::array<const char*, 3> letters{"x", "y", "z"};
+// Of coordinates in requests: of any data, and of those with longitudes and latitudes.
+constexpr std::array<const char*, 3> letters{"x", "y", "z (or level)"};
+constexpr std::array<const char*, 3> geographic_letters{"x (or lon)", "y (or lat)", "z (or level)"};
 
 std::string number(double value) {
   std::array<char, 40> text{};
@@ -36,14 +38,14 @@ std::string interval(const std::array<double, 2>& box, const std::string& units)
   return text;
 }
 
-Error outside(std::size_t axis, double at, const std::string& box) {
-  std::string message = letters[axis];
+Error outside(const char* letter, double at, const std::string& box) {
+  std::string message = letter;
   message.append(" = ").append(number(at)).append(" is outside the box of the data: ").append(box);
   return make_error(ErrorKind::invalid, std::move(message));
 }
 
-Error absent(std::size_t axis) {
-  return make_error(ErrorKind::invalid, std::string(letters[axis]) + " is required");
+Error absent(const char* letter) {
+  return make_error(ErrorKind::invalid, std::string(letter) + " is required");
 }
 
 bool goes_round(const Axis& axis) {
@@ -76,8 +78,10 @@ bool within(const std::array<double, 2>& box, double at, bool round) {
   return at + turn * std::ceil((first - at) / turn) <= box[1] + slack;
 }
 
-Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optional<double>& at) {
+Result<int> nearest_along(const Axis& axis, std::size_t index, const std::optional<double>& at) {
   if (axis.coordinates.size() == 1) return 0;
+  const bool geographic = axis.kind == AxisKind::longitude || axis.kind == AxisKind::latitude;
+  const char* const letter = (geographic ? geographic_letters : letters)[index];
   if (!at) return absent(letter);
   const bool round = goes_round(axis);
   const std::array<double, 2> box = box_of(axis);
@@ -117,7 +121,7 @@ double reach(const Columns& columns, const std::array<int, 3>& dims, int x, int 
 }
 
 Error beyond_poles(double latitude) {
-  return outside(1, latitude,
+  return outside(geographic_letters[1], latitude,
                  "x and y are longitude and latitude here, which must be from -90 to 90 degrees");
 }
 
@@ -139,7 +143,7 @@ Result<std::array<int, 2>> within_reach(const Columns& columns, const std::array
     box.append(number(latitude)).append("; columns are at longitudes ");
     box.append(interval({*west, *east}, "")).append(", latitudes ");
     box.append(interval({*south, *north}, "degrees"));
-    return outside(0, longitude, box);
+    return outside(geographic_letters[0], longitude, box);
   }
   return std::array{x, y};
 }
@@ -151,8 +155,8 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
   WINDSPLAT_CHECK(columns.longitude.size() == columns.latitude.size() &&
                   columns.longitude.size() ==
                       static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
-  if (!at[0]) return absent(0);
-  if (!at[1]) return absent(1);
+  if (!at[0]) return absent(geographic_letters[0]);
+  if (!at[1]) return absent(geographic_letters[1]);
   if (std::abs(*at[1]) > 90) return beyond_poles(*at[1]);
   double least = std::numeric_limits<double>::infinity();
   std::size_t nearest = 0;
@@ -272,7 +276,7 @@ void ColumnSearch::seek(const std::array<double, 3>& place, std::size_t first, s
 
 Result<std::array<int, 2>> ColumnSearch::nearest(double longitude, double latitude) const {
   if (std::abs(latitude) > 90) return beyond_poles(latitude);
-  if (nodes_.empty()) return outside(0, longitude, "no column has a place");
+  if (nodes_.empty()) return outside(geographic_letters[0], longitude, "no column has a place");
   Best best{std::numeric_limits<double>::infinity(), 0};
   seek(unit_vector(longitude, latitude), 0, nodes_.size(), 0, best);
   const double least = distance(longitude, latitude, columns_.longitude[best.column],

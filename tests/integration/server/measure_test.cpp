@@ -167,7 +167,7 @@ TEST_F(Measures, SamplesAreProbedByTheirIndices) {
 
 TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=0&y=95&z=500"), 422, "box");
-  expect_problem_saying(refused("probe?x=0&y=0"), 422, "z is required");
+  expect_problem_saying(refused("probe?x=0&y=0"), 422, "z (or level) is required");
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=1e999&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=0&y=0&z=500&step=3"), 422);

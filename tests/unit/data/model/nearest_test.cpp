@@ -66,9 +66,9 @@ TEST(NearestSample, BoxExtendsHalfACellBeyondTheSamples) {
   EXPECT_THAT(found(grid, -4.9, 64.9, -99), ElementsAre(0, 0, 4));
   EXPECT_THAT(refusal(grid, {95.1, 40, 850}), HasSubstr("-5 to 95 degrees_east"));
   EXPECT_THAT(refusal(grid, {0, 65.1, 850}), HasSubstr("25 to 65 degrees_north"));
-  EXPECT_THAT(refusal(grid, {0, 24.9, 850}), HasSubstr("y = 24.9"));
+  EXPECT_THAT(refusal(grid, {0, 24.9, 850}), HasSubstr("y (or lat) = 24.9"));
   EXPECT_THAT(refusal(grid, {0, 40, 1038}), HasSubstr("to 1037.5 hPa"));
-  EXPECT_THAT(refusal(grid, {0, 40, std::nullopt}), HasSubstr("z is required"));
+  EXPECT_THAT(refusal(grid, {0, 40, std::nullopt}), HasSubstr("z (or level) is required"));
 }
 
 TEST(NearestSample, OnlyLongitudesArePeriodic) {
