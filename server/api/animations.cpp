@@ -103,6 +103,16 @@ http::Response begin(tasks::Backend& backend, access::Admission& admission,
   return job_response(backend.metrics, base_path, backend.jobs.submit("animation", work, terms));
 }
 
+// Of "<id>.<format>". Errors: not_found.
+Result<tasks::Animations::Kept> named(tasks::Animations& animations, const std::string& name) {
+  const auto container = movie::container_of(name);
+  auto kept = animations.find(name.substr(0, name.rfind('.')));
+  if (!container || !kept || movie::name_of(*container) != kept->description.format) {
+    return make_error(ErrorKind::not_found, "unknown or expired animation: post it again");
+  }
+  return std::move(*kept);
+}
+
 }  // namespace
 
 void post_animation(tasks::Backend& backend, access::Admission& admission,
@@ -123,12 +133,8 @@ void post_animation(tasks::Backend& backend, access::Admission& admission,
 // The content of an id never changes.
 http::Response get_animation(tasks::Animations& animations, const std::string& name,
                              const http::Request& request) {
-  const auto container = movie::container_of(name);
-  const auto kept = animations.find(name.substr(0, name.rfind('.')));
-  if (!container || !kept || movie::name_of(*container) != kept->description.format) {
-    return http::problem_response(
-        make_error(ErrorKind::not_found, "unknown or expired animation: post it again"));
-  }
+  const auto kept = named(animations, name);
+  if (!kept) return http::problem_response(kept.error());
   http::Response response;
   const std::string etag = '"' + kept->description.id + '"';
   response.headers = {{"Cache-Control", "private, max-age=3600, immutable"}, {"ETag", etag}};
@@ -136,11 +142,18 @@ http::Response get_animation(tasks::Animations& animations, const std::string& n
     response.status = 304;
     return response;
   }
-  response.content_type = movie::media_type_of(*container);
+  response.content_type = movie::media_type_of(*movie::container_of(name));
   response.headers.emplace_back("Content-Disposition",
                                 "attachment; filename=\"" + kept->file_name + '"');
   response.body = {kept->file, kept->file->bytes()};
   return response;
+}
+
+http::Response delete_animation(tasks::Animations& animations, const std::string& name) {
+  const auto kept = named(animations, name);
+  if (!kept) return http::problem_response(kept.error());
+  animations.remove(kept->description.id);
+  return {204, "", {{"Cache-Control", "no-store"}}, {}};
 }
 
 }  // namespace windsplat::api

@@ -100,6 +100,7 @@ void post_animation(tasks::Backend& backend, access::Admission& admission,
                     const http::Request& request, http::Reply reply);
 http::Response get_animation(tasks::Animations& animations, const std::string& name,
                              const http::Request& request);
+http::Response delete_animation(tasks::Animations& animations, const std::string& name);
 // What a pixel of a posted view shows.
 void post_pick(tasks::Backend& backend, const http::Request& request, http::Reply reply);
 // Estimated time and error of a picture of a posted view.

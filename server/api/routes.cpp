@@ -129,6 +129,8 @@ std::vector<Route> picture_routes(const std::string& base_path, access::Admissio
             later(post_animation, backend, admission, look_ups, base_path), Charge::valid_picture},
       Route{"GET", "/v1/animations/{id}", operations::read_animation(),
             at_once(get_animation, backend.animations)},
+      Route{"DELETE", "/v1/animations/{id}", operations::remove_animation(),
+            at_once(delete_animation, backend.animations)},
   };
 }
 

@@ -32,6 +32,7 @@ Operation draw_reference();
 Operation read_reference();
 Operation draw_animation();
 Operation read_animation();
+Operation remove_animation();
 
 // datasets.cpp
 Operation list_files();

@@ -163,4 +163,12 @@ Operation read_animation() {
           .problems = {404}};
 }
 
+Operation remove_animation() {
+  return {.id = "removeAnimation",
+          .group = pictures_group,
+          .summary = "Remove a finished animation",
+          .answers = {nothing("It is removed.")},
+          .problems = {404}};
+}
+
 }  // namespace windsplat::api::operations

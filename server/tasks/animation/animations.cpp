@@ -49,6 +49,12 @@ std::optional<Animations::Kept> Animations::find(const std::string& id, Clock::t
   return found->kept;
 }
 
+bool Animations::remove(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  return std::erase_if(entries_, [&](const Entry& one) { return one.kept.description.id == id; }) >
+         0;
+}
+
 void Animations::expire(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   std::erase_if(entries_, [&](const Entry& one) { return one.until <= now; });

@@ -55,6 +55,8 @@ class Animations {
   void keep(Kept kept, Clock::time_point now = Clock::now());
   [[nodiscard]] std::optional<Kept> find(const std::string& id,
                                          Clock::time_point now = Clock::now());
+  // False: there is none of that id.
+  bool remove(const std::string& id);
   // Removes those whose time is over. Call it periodically.
   void expire(Clock::time_point now = Clock::now());
 

@@ -43,6 +43,15 @@ TEST(KeptAnimations, TheOldestMakeRoomForNewOnes) {
   for (const char* id : {"b", "c", "d"}) EXPECT_TRUE(kept.find(id)) << id;
 }
 
+TEST(KeptAnimations, OneIsRemoved) {
+  Animations kept;
+  for (const char* id : {"a", "b"}) kept.keep(animation_of(id, 1));
+  EXPECT_TRUE(kept.remove("a"));
+  EXPECT_FALSE(kept.remove("a"));
+  EXPECT_FALSE(kept.find("a"));
+  EXPECT_TRUE(kept.find("b"));
+}
+
 TEST(KeptAnimations, AFileIsReadWhileItIsHeldThoughItIsClosedAndForgotten) {
   Animations kept;
   {
