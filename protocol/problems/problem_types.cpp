@@ -50,8 +50,8 @@ constexpr std::array<ProblemType, 27> table{{
      "--allow-host."},
     {"invalid-value", 422, "Unprocessable Content",
      "The document or query can be parsed, but a value is unknown, out of its range or at odds "
-     "with another. Each entry of errors has the JSON pointer of a value and what is wrong with "
-     "it."},
+     "with another. Of a document, each entry of errors has the JSON pointer of a value and what "
+     "is wrong with it."},
     {"unreadable-data", 422, "Unprocessable Content",
      "A file is damaged, or in a form that is not supported. The detail names it."},
     {"upgrade-required", 426, "Upgrade Required",
@@ -77,8 +77,8 @@ constexpr std::array<ProblemType, 27> table{{
     {"http-version", 505, "HTTP Version Not Supported",
      "The request has another version than HTTP/1.1 or HTTP/1.0."},
     {"out-of-memory", 507, "Insufficient Storage",
-     "There is not enough memory below --memory-limit, or no space on the disk. Choose a smaller "
-     "region, a coarser resolution or fewer fields, or free space."},
+     "There is not enough memory below --memory-limit, no space on the disk, or no room left for "
+     "uploads. Choose a smaller region, a coarser resolution or fewer fields, or free space."},
 }};
 
 }  // namespace

@@ -138,7 +138,8 @@ struct Uploads::State {
                                                     std::to_string(left_for(address)) +
                                                     " are left of --upload-limit " +
                                                     std::to_string(options.bytes_max) +
-                                                    ", of which an address may have half");
+                                                    ", of which an address may have half; delete "
+                                                    "uploads, or wait until they expire");
   }
   void release(const std::string& address, std::uint64_t bytes) {
     bytes_taken -= bytes;
@@ -239,6 +240,11 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
                                               printable(id, id_chars_max) + "'");
   }
   if (bytes == 0) return make_error(ErrorKind::invalid, "an upload must have a body");
+  if (bytes > bytes_max_per_address()) {
+    return make_error(ErrorKind::too_large,
+                      "the upload has " + std::to_string(bytes) + " bytes, above the limit of " +
+                          std::to_string(bytes_max_per_address()) + ", half of --upload-limit");
+  }
   State& state = *state_;
   const std::lock_guard lock(state.mutex);
   if (state.entries.contains(id) || state.receiving.contains(id)) {

@@ -67,8 +67,8 @@ class Uploads {
   [[nodiscard]] static std::string path_of(const std::string& id);
 
   // Takes the id, and room as bytes arrive; does not wait for a disk. Errors: invalid (id, no
-  // bytes); conflict (an upload of that id exists); busy (too many at a time); out_of_memory (more
-  // than what is left of the quota).
+  // bytes); too_large (for one address); conflict (an upload of that id exists); busy (too many at
+  // a time); out_of_memory (more than what is left of the quota).
   Result<std::shared_ptr<Incoming>> begin(const Announced& announced);
   // Errors: not_found.
   [[nodiscard]] Result<Upload> find(const std::string& id) const;
