@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "server/data/archive/zip.hpp"
 #include "server/data/loader/bytes.hpp"
@@ -28,9 +29,16 @@ Result<void> say_to_daemon(Kind kind, std::string_view payload) {
   return {};
 }
 
+// Which macOS adds to archives and folders; no data.
+bool is_of_macos(const archive::ZipEntry& entry) {
+  return entry.name.starts_with("__MACOSX/") || entry.name == ".DS_Store" ||
+         entry.name.ends_with("/.DS_Store");
+}
+
 Result<void> send_entries(const Descriptor& file) {
-  const auto entries = archive::list_zip(file.number());
+  auto entries = archive::list_zip(file.number());
   if (!entries) return entries.error();
+  std::erase_if(*entries, is_of_macos);
   Writer out;
   out.number(archive::disk_bytes_of(*entries));
   auto done = say_to_daemon(Kind::entries, out.bytes());

@@ -337,8 +337,10 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   if (files->location().kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
                       in_quotes(files->location().stem) +
-                          (files->location().fetched ? " has no metadata of a Zarr store"
-                                                     : " is a directory, but not a Zarr store"));
+                          (files->location().fetched
+                               ? " has no metadata of a Zarr store"
+                               : " is a directory without a Zarr store (no .zgroup, .zarray or "
+                                 "zarr.json)"));
   }
   if (files->location().kind == Location::Kind::series) {
     return source_of(*files, open_series(files));

@@ -40,7 +40,8 @@ TEST(NetcdfRefusals, MissingAndIrregularFiles) {
   expect_refused(folder / "no/folder.nc", ErrorKind::not_found, "no such file");
   expect_refused("", ErrorKind::not_found, "no file name");
   std::filesystem::create_directory(folder / "dir.nc");
-  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, but not a Zarr store");
+  expect_refused(folder / "dir.nc", ErrorKind::bad_data,
+                 "is a directory without a Zarr store (no .zgroup, .zarray or zarr.json)");
   ASSERT_EQ(::mkfifo((folder / "pipe.nc").c_str(), 0600), 0);
   expect_refused(folder / "pipe.nc", ErrorKind::bad_data, "not a regular file");
   expect_refused("/dev/null", ErrorKind::bad_data, "not a regular file");
