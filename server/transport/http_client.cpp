@@ -163,9 +163,9 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   const bool secure = parts && parts->scheme() == "https";
   const bool is_local = parts && parts->scheme() == "http+unix";
   if (!parts || (!secure && !is_local && parts->scheme() != "http") || parts->host().empty()) {
-    return make_error(ErrorKind::malformed, "'" + printable(url) +
-                                                "' is not an http://, https:// or http+unix:// "
-                                                "URL");
+    return make_error(
+        ErrorKind::malformed,
+        "'" + printable(url) + "' does not begin with http://, https:// or http+unix://");
   }
   asio::ssl::context context(asio::ssl::context::tls_client);
   if (secure) {
