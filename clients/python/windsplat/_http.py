@@ -102,7 +102,7 @@ class _Body:
 
 
 class Http:
-    """Requests below one address. Safe to use from several threads."""
+    """Requests below one address. Safe to use from several threads and, after a fork, processes."""
 
     def __init__(self, url: str, token: str | None, timeout: float, patience: float,
                  verify: bool | str | ssl.SSLContext = True) -> None:
@@ -119,20 +119,38 @@ class Http:
         self.patience = patience
         self.ended: Callable[[], str] = str
         """Says how a server that was started here has ended; empty: it runs."""
+        self._timeout = timeout
+        self._closed = False
+        self._clients: dict[int, httpx.Client] = {}  # by process
+
+    @property
+    def _client(self) -> httpx.Client:
+        """The client of this process. A fork inherits those of its ancestors, whose connections
+        carry the answers to them, and whose locks a thread that it lacks may hold: it makes one of
+        its own, and keeps the others, so that nothing closes them."""
+        own = self._clients.get(os.getpid())
+        # Of two threads that come here at once, both take the client of the first.
+        return own or self._clients.setdefault(os.getpid(), self._new_client())
+
+    def _new_client(self) -> httpx.Client:
         headers = {"User-Agent": "windsplat-python"}
-        if token:
-            headers["Authorization"] = f"Bearer {token}"
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
         # Without https no certificates are read, which takes longer than most requests.
         check: bool | ssl.SSLContext = False if self.tls is None else self.tls
         # Pictures are rendered before the first byte is sent, hence the long time to read.
-        self._client = httpx.Client(
-            headers=headers, timeout=httpx.Timeout(timeout, connect=min(timeout, 10.0)),
+        timeout = httpx.Timeout(self._timeout, connect=min(self._timeout, 10.0))
+        return httpx.Client(
+            headers=headers, timeout=timeout,
             verify=check, trust_env=not self.loopback,
             transport=None if self.socket is None else httpx.HTTPTransport(verify=check,
                                                                            uds=self.socket))
 
     def close(self) -> None:
-        self._client.close()
+        """Closes the connections of this process."""
+        self._closed = True
+        if own := self._clients.get(os.getpid()):
+            own.close()
 
     def request(
         self,
@@ -157,7 +175,7 @@ class Http:
         url = self.base + path.lstrip("/")
         end = time.monotonic() + self.patience
         while True:
-            if self._client.is_closed:
+            if self._closed:
                 raise ConnectionFailed(f"{self.name}: this server was closed by close(): start or "
                                        "connect to one again")
             try:
@@ -189,7 +207,7 @@ class Http:
         if ended := self.ended():
             return f"{self.name}: {ended}"
         if isinstance(error, httpx.ReadTimeout):
-            return f"{self.name}: no answer within {self._client.timeout.read:g} s (timeout=...)"
+            return f"{self.name}: no answer within {self._timeout:g} s (timeout=...)"
         said = re.sub(r"^\[Errno -?\d+\] ", "", str(error)) or type(error).__name__
         return f"{self.name}: {said}"
 

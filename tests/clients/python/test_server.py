@@ -1,10 +1,12 @@
 """Servers, datasets and values, against the real daemon; refusals against prepared answers."""
 import asyncio
 import base64
+import concurrent.futures
 import datetime
 import email.utils
 import hashlib
 import json
+import multiprocessing
 import os
 import pathlib
 import subprocess
@@ -338,6 +340,57 @@ class Secured(unittest.TestCase):
         with unittest.mock.patch.dict(os.environ, variables):
             with windsplat.connect(server.url) as again:
                 self.assertIn("tornado:24", again.datasets)
+
+
+def drawn(size):
+    """A picture of the shared server, as a worker asks for it."""
+    return shared_server()[0]["tornado:24"].view(size=size).frame().bytes
+
+
+class Forks(unittest.TestCase):
+    def test_workers_get_their_own_pictures_and_so_does_the_process_that_they_are_forks_of(self):
+        sizes = [(32 + 4 * k, 24) for k in range(12)]
+        with concurrent.futures.ThreadPoolExecutor(4) as threads:  # leave connections at rest
+            wanted = list(threads.map(drawn, sizes))
+        self.assertEqual(len(set(wanted)), len(sizes))
+        own, ended = [], threading.Event()
+
+        def draw():
+            while not ended.is_set():
+                own.append(drawn(sizes[0]))
+
+        thread = threading.Thread(target=draw)  # requests are under way at the fork
+        thread.start()
+        try:
+            with multiprocessing.get_context("fork").Pool(4) as pool:
+                got = pool.map_async(drawn, 4 * sizes, chunksize=1).get(timeout=120)
+        finally:
+            ended.set()
+            thread.join()
+        self.assertEqual(got, 4 * wanted)
+        self.assertEqual(set(own), {wanted[0]})
+
+    def test_a_fork_of_a_closed_server_is_closed_and_closing_in_a_fork_is_of_the_fork(self):
+        url = shared_server()[0].url
+
+        def child(server, closes):
+            if closes:
+                server.close()
+            with self.assertRaisesRegex(windsplat.ConnectionFailed, "closed by close"):
+                server.version
+
+        for closes in (True, False):
+            server = windsplat.connect(url)
+            if not closes:
+                server.close()
+            fork = multiprocessing.get_context("fork").Process(target=child,
+                                                               args=(server, closes))
+            fork.start()
+            fork.join(60)
+            self.assertEqual(fork.exitcode, 0)
+            if closes:
+                self.assertTrue(server.version)
+                server.close()
 
 
 class Threads(unittest.TestCase):
