@@ -125,6 +125,7 @@ class Process:
             start_new_session=True,
         )
         self._process = process
+        self._parent = os.getpid()
         self._lines: collections.deque[str] = collections.deque(maxlen=LOG_LINES)
         self._finalizer = weakref.finalize(self, _end, process, _guard_of(process))
         urls: queue.Queue[str | None] = queue.Queue()
@@ -169,7 +170,10 @@ class Process:
         return "\n".join(own or list(self._lines)[-5:]) or "without a message"
 
     def ended(self) -> str:
-        """How the program ended, with what it said last; empty: it runs."""
+        """How the program ended, with what it said last; empty: it runs, or this is a fork of the
+        process that started it, which alone is told."""
+        if os.getpid() != self._parent:
+            return ""
         code = self._process.poll()
         if code is None:
             return ""

@@ -347,6 +347,10 @@ def drawn(size):
     return shared_server()[0]["tornado:24"].view(size=size).frame().bytes
 
 
+def said_of_the_end():
+    return shared_server()[0]._process.ended()
+
+
 class Forks(unittest.TestCase):
     def test_workers_get_their_own_pictures_and_so_does_the_process_that_they_are_forks_of(self):
         sizes = [(32 + 4 * k, 24) for k in range(12)]
@@ -391,6 +395,10 @@ class Forks(unittest.TestCase):
             if closes:
                 self.assertTrue(server.version)
                 server.close()
+
+    def test_a_fork_does_not_report_a_running_server_as_ended(self):
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            self.assertEqual(pool.apply_async(said_of_the_end).get(timeout=60), "")
 
 
 class Threads(unittest.TestCase):
