@@ -6,6 +6,7 @@ import asyncio
 import base64
 import dataclasses
 import json
+import os
 import struct
 import time
 from typing import TYPE_CHECKING, Any, Mapping
@@ -116,7 +117,7 @@ class Stream:
 
     A frame is acknowledged when the next one is asked for, so that the server sends no more than
     the loop can take. A patch that the server refuses is raised as Problem by the loop, which may
-    be entered again.
+    be entered again. A stream belongs to the process that entered it: a fork enters one of its own.
     """
 
     def __init__(self, server: Server, view: View) -> None:
@@ -124,6 +125,7 @@ class Stream:
         self._accepted = view.to_dict()  # what the server has accepted
         self._patches: dict[int, dict[str, Any]] = {}  # by rev, not answered yet
         self._socket: Any = None
+        self._process = 0  # that entered the stream
         self._rev = 0
         self._shown: int | None = None  # seq of the frame that is not acknowledged yet
         self._chosen: dict[int, Mapping[str, Any]] = {}
@@ -156,6 +158,7 @@ class Stream:
             else:
                 self._socket = await websockets.unix_connect(  # type: ignore[attr-defined]
                     http.socket, url, **options)
+            self._process = os.getpid()
             self.hello = json.loads(await self._socket.recv())
         except (OSError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as error:
             answer = getattr(error, "response", None)
@@ -173,14 +176,20 @@ class Stream:
 
     async def close(self) -> None:
         self._closed = True
-        if self._socket is not None:
+        if self._socket is not None and self._process == os.getpid():
             await self._socket.close()
+
+    def _check_entered(self) -> None:
+        if self._socket is None:
+            raise WindsplatError("enter the stream first: async with server.stream(view) as stream")
+        if self._process != os.getpid():
+            raise WindsplatError("the stream was entered by another process, of which this one is "
+                                 "a fork: enter a stream here")
 
     async def _send(self, message: Mapping[str, Any]) -> None:
         import websockets.exceptions
 
-        if self._socket is None:
-            raise WindsplatError("enter the stream first: async with server.stream(view) as stream")
+        self._check_entered()
         try:
             await self._socket.send(json.dumps(message))
         except websockets.exceptions.ConnectionClosed as error:
@@ -238,6 +247,7 @@ class Stream:
         """The next frame; None: the last final frame shows the patch `rev` already."""
         import websockets.exceptions
 
+        self._check_entered()
         if self._shown is not None:
             seq, self._shown = self._shown, None
             await self._send({"type": "ack", "seq": seq})

@@ -2,6 +2,7 @@
 import asyncio
 import io
 import math
+import multiprocessing
 import os
 import pathlib
 import stat
@@ -381,6 +382,28 @@ class Streams(unittest.IsolatedAsyncioTestCase):
             second = await stream.__anext__()
             self.assertEqual([one["seq"] for one in sent if one["type"] == "ack"], [first.seq])
             self.assertGreater(second.seq, first.seq)
+
+    async def test_a_fork_neither_uses_nor_closes_the_stream_of_another_process(self):
+        async with self.server.stream(self.view) as stream:
+            await stream.final()
+
+            def child():
+                for call in (lambda: stream.patch({"step": 2}), stream.__anext__):
+                    with self.assertRaisesRegex(windsplat.WindsplatError, "another process"):
+                        asyncio.run(call())
+                asyncio.run(stream.close())
+
+            fork = multiprocessing.get_context("fork").Process(target=child)
+            fork.start()
+            fork.join(60)
+            self.addCleanup(fork.kill)
+            self.assertEqual(fork.exitcode, 0)
+            await stream.patch({"step": 3})
+            self.assertEqual((await stream.final()).step, 3)
+
+    async def test_a_stream_that_was_not_entered_says_so(self):
+        with self.assertRaisesRegex(windsplat.WindsplatError, "enter the stream first"):
+            await self.server.stream(self.view).__anext__()
 
     async def test_a_lost_server_is_told(self):
         with self.assertRaises(windsplat.ConnectionFailed):
