@@ -166,8 +166,9 @@ def _suffix_of(path: pathlib.Path) -> str:
 
 @contextlib.contextmanager
 def _part_of(path: pathlib.Path) -> Iterator[pathlib.Path]:
-    """A name to write to, which becomes `path` unless there is an error."""
+    """An empty file to write to, which becomes `path` unless there is an error."""
     part = path.with_name(f".{path.name}.part")
+    part.touch()  # a folder that cannot be written is found before pictures are drawn
     try:
         yield part
         part.replace(path)
@@ -192,20 +193,20 @@ def animation(
     besides view and format, of which those that are None are left out.
 
     The job is ended if it takes longer than `timeout` seconds, or this call is interrupted. Raises
-    the Problem that the server reports, JobTimeout.
+    the Problem that the server reports, JobTimeout, OSError for a place that cannot be written.
     """
     server = view.dataset.server
     asked = {key: value for key, value in motion.items() if value is not None}
     asked |= {"view": view.to_dict(), "format": path.suffix.lower()[1:]}
-    job = server.http.request("POST", "v1/animations", json=asked).json()
     tell = None if progress is None else lambda done: progress(round(100 * done), 100)
-    try:
-        made = server.finished(job, timeout, tell)
-    except BaseException:
-        with contextlib.suppress(WindsplatError):
-            server.http.request("DELETE", f"v1/jobs/{job['id']}")
-        raise
     with _part_of(path) as part:
+        job = server.http.request("POST", "v1/animations", json=asked).json()
+        try:
+            made = server.finished(job, timeout, tell)
+        except BaseException:
+            with contextlib.suppress(WindsplatError):
+                server.http.request("DELETE", f"v1/jobs/{job['id']}")
+            raise
         part.write_bytes(server.http.request("GET", made["movie"], accept="*/*").content)
     return Movie(path, made["frames"], made["fps"], made["width"], made["height"])
 

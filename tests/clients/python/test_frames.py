@@ -289,6 +289,13 @@ class Movies(unittest.TestCase):
         self.assertEqual(job["state"], "cancelled")
         self.assertEqual(list(self.folder.iterdir()), [])
 
+    def test_a_place_that_cannot_be_written_is_found_before_anything_is_drawn(self):
+        jobs = self.server.http.get("v1/jobs")["jobs"]
+        for more in ({}, {"workers": 1}):
+            with self.subTest(more), self.assertRaisesRegex(FileNotFoundError, r"nowhere/\.a\.zip"):
+                self.view.movie(self.folder / "nowhere" / "a.zip", steps=[0], **more)
+        self.assertEqual(self.server.http.get("v1/jobs")["jobs"], jobs)
+
     def test_motions_of_the_server_are_refused_where_it_does_not_draw(self):
         for given in ({"turn": 90, "workers": 2}, {"frames": 4, "steps": [0, 1, 5]}):
             with self.assertRaisesRegex(ValueError, "at equal distances"):
