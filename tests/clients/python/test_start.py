@@ -84,8 +84,8 @@ class Start(unittest.TestCase):
                                "echo windsplat: reads >&2\nexec sleep 600\n")
             program.chmod(0o755)
             with self.assertRaisesRegex(windsplat.StartFailed,
-                                        r"after 1 s \(start_timeout\): windsplat: reads"):
-                windsplat.Server.start(program=program, start_timeout=1)
+                                        r"after 5 s \(start_timeout\): windsplat: reads"):
+                windsplat.Server.start(program=program, start_timeout=5)
             self.assertTrue(ends(int((pathlib.Path(folder) / "pid").read_text())))
 
     def test_other_systems_only_connect(self):
