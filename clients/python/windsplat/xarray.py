@@ -49,7 +49,8 @@ def _is_time(dataset: xarray.Dataset, dimension: Any) -> bool:
     coordinate = dataset.coords.get(dimension)
     return coordinate is not None and (
         coordinate.dtype.kind in "mM" or coordinate.attrs.get("axis") == "T"
-        or (coordinate.dtype.kind == "O" and hasattr(coordinate.values[0], "calendar")))
+        or (coordinate.dtype.kind == "O" and hasattr(next(iter(coordinate.values), None),
+                                                     "calendar")))
 
 
 def space_dimensions(dataset: xarray.Dataset, name: Any) -> list[str]:

@@ -249,6 +249,8 @@ class Accessors(unittest.TestCase):
         refused = (
             (cube("f8") * 1e300, "'a' has values up to 5.9e.301; the server keeps float32, at"),
             (cube().isel(x=slice(0)), "'a' has no values: its shape is .*'x': 0"),
+            (xarray.Dataset({"a": (("when", "z", "y", "x"), np.zeros((0, 3, 4, 5)))},
+                            {"when": np.array([], dtype=object)}), "'a' has no values"),
             (cube("c8"), "no variable of numbers.*complex64"))
         for arrays, text in refused:
             with self.subTest(text), self.assertRaisesRegex(ValueError, text):
