@@ -14,6 +14,7 @@ import xarray
 KEPT_ENCODING = ("units", "calendar", "_FillValue", "missing_value", "grid_mapping", "coordinates")
 # Attributes that a netCDF file can have.
 PLAIN = (str, int, float, np.ndarray, np.number, list, tuple)
+MARKS = ("_FillValue", "missing_value")
 
 
 def file_name_of(name: Any, taken: Sequence[str]) -> str:
@@ -65,6 +66,25 @@ def _samples(name: str, values: Any, kind: str) -> Any:
     return out.astype(kind, copy=False)
 
 
+def _marks_of(variable: xarray.DataArray) -> Any:
+    """The numbers that mark missing values, in the type of the array: shape (n). Those of the
+    encoding of floats are of packed numbers, and xarray has decoded them. A text, and a number that
+    the type lacks, mark nothing."""
+    dtype = variable.dtype
+    given = variable.attrs if dtype.kind == "f" else {**variable.encoding, **variable.attrs}
+    out = [np.empty(0, dtype)]
+    for key in MARKS:
+        marks = np.ravel(given.get(key, ()))
+        if marks.dtype.kind not in "biuf":
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            cast = marks.astype(dtype)
+        # Floats are compared as they were rounded for the array.
+        same = np.isfinite(cast) == np.isfinite(marks) if dtype.kind == "f" else cast == marks
+        out.append(cast[same])
+    return np.concatenate(out)
+
+
 def _add(file: Any, dataset: xarray.Dataset, name: Any, new: str,
          new_of: Mapping[Any, str]) -> None:
     """Adds a field to an open file that has the coordinates."""
@@ -81,11 +101,13 @@ def _add(file: Any, dataset: xarray.Dataset, name: Any, new: str,
     if beside and "coordinates" not in attributes:
         attributes["coordinates"] = " ".join(beside)
     kind = _type_of(variable.dtype)
-    marks = [attributes.pop(key) for key in ("_FillValue", "missing_value") if key in attributes]
+    for key in MARKS:
+        attributes.pop(key, None)
+    marks = _marks_of(variable)
     fill: Any = np.float32(np.nan)
-    if kind != "f4":
-        fill = np.array(marks[0]).astype(kind)[()] if marks else None
-        marks = []
+    if kind != "f4":  # which has one mark: the first stands for the others
+        fill = marks[0].astype(kind) if marks.size else None
+        marks = marks[1:]
     if not {"scale_factor", "add_offset"}.isdisjoint(variable.encoding):
         for key in ("valid_range", "valid_min", "valid_max"):  # of values that were unpacked
             attributes.pop(key, None)
@@ -95,8 +117,8 @@ def _add(file: Any, dataset: xarray.Dataset, name: Any, new: str,
     for index in range(variable.shape[0]):
         # An entry of a lazy array is read, computed and forgotten.
         entry = np.asarray(variable[{variable.dims[0]: index}].variable.data)
-        for mark in marks:
-            entry = np.where(entry == mark, np.nan, entry)
+        if marks.size:
+            entry = np.where(np.isin(entry, marks), fill, entry)
         out[index] = _samples(str(name), entry, kind)
 
 

@@ -201,8 +201,32 @@ class Accessors(unittest.TestCase):
         wanted = marked.a[1].where((marked.a[1] != 7) & (marked.a[1] != 1e300)).values.astype("f4")
         np.testing.assert_array_equal(self.values(marked), wanted)
         unpacked = cube("f4", valid_range=np.array([0, 20], "i2"))  # of the packed values
-        unpacked.a.encoding.update(dtype="int16", scale_factor=0.01, _FillValue=-1)
+        unpacked.a.encoding.update(dtype="int16", scale_factor=0.01, _FillValue=-1,
+                                   missing_value=-2)
+        unpacked.a.values[1, 0, 0, :2] = -1.0, -2.0  # the marks are of packed numbers
         np.testing.assert_array_equal(self.values(unpacked), unpacked.a[1].values)
+
+    def test_several_marks_of_missing_values_are_all_masked(self):
+        several = {"missing_value": [7, 8]}, {"missing_value": np.array([8, 7]), "_FillValue": 9}
+        for dtype in ("f4", "f8", "i2", "u1", "i8"):
+            for marks in several:
+                arrays = cube(dtype, **marks)  # as read without decoding
+                arrays.a.values[1, 0, 0, :3] = 7, 8, 9
+                gone = np.isin(arrays.a[1], [7, 8, marks.get("_FillValue", 7)])
+                with self.subTest(dtype=dtype, **marks):
+                    np.testing.assert_array_equal(
+                        self.values(arrays), np.where(gone, np.nan, arrays.a[1]).astype("f4"))
+
+    def test_marks_that_the_type_lacks_mark_nothing(self):
+        for dtype, mark in (("i2", 65536.0), ("u1", -1), ("i2", 7.5), ("i2", "none"),
+                            ("f4", "none"), ("f4", 1e300)):
+            arrays = cube(dtype, missing_value=mark)
+            arrays.a.values[1, 0, 0, :2] = 0, 255
+            with self.subTest(dtype=dtype, mark=mark):
+                np.testing.assert_array_equal(self.values(arrays), arrays.a[1].values)
+        rounded = cube("f4", missing_value=np.float64(0.1))  # of float32 in the array
+        rounded.a[1, 0, 0, 0] = 0.1
+        self.assertTrue(np.isnan(self.values(rounded)[0, 0, 0]))
 
     def test_fields_without_any_value_have_no_range(self):
         dataset = (cube() * np.nan).windsplat.open(server=self.server)
