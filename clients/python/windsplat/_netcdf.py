@@ -1,11 +1,11 @@
-"""Writes arrays of xarray to a netCDF file, one entry of their first dimension at a time: no second
-copy of an array that is large, lazy or in chunks is in memory."""
+"""Writes arrays of xarray to a netCDF file, one entry or chunk of their first dimension at a time:
+no second copy of an array that is large, lazy or in chunks is in memory."""
 from __future__ import annotations
 
 import pathlib
 import re
 import shutil
-from typing import Any, Hashable, Mapping, Sequence
+from typing import Any, Hashable, Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray
@@ -15,6 +15,7 @@ KEPT_ENCODING = ("units", "calendar", "_FillValue", "missing_value", "grid_mappi
 # Attributes that a netCDF file can have.
 PLAIN = (str, int, float, np.ndarray, np.number, list, tuple)
 MARKS = ("_FillValue", "missing_value")
+READ_BYTES = 256_000_000  # at most of an array in chunks at once, if an entry has no more
 
 
 def file_name_of(name: Any, taken: Sequence[str]) -> str:
@@ -53,7 +54,7 @@ def _type_of(dtype: np.dtype[Any]) -> str:
 
 
 def _samples(name: str, values: Any, kind: str) -> Any:
-    """One entry as the file has it. Raises ValueError for what float32 cannot hold."""
+    """Samples as the file has them. Raises ValueError for what float32 cannot hold."""
     out = np.asarray(values)
     if kind == "f4" and out.dtype != np.float32:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -85,6 +86,19 @@ def _marks_of(variable: xarray.DataArray) -> Any:
     return np.concatenate(out)
 
 
+def _parts_of(variable: xarray.DataArray) -> Iterator[slice]:
+    """The ranges of the first dimension that are read one after another: single entries; of dask,
+    which computes a whole chunk for any entry of it, chunks of up to READ_BYTES."""
+    lengths = variable.chunks[0] if variable.chunks else (1,) * variable.shape[0]
+    most = max(1, READ_BYTES * variable.shape[0] // variable.nbytes)
+    first = 0
+    for length in lengths:
+        last = first + length
+        for start in range(first, last, most):
+            yield slice(start, min(start + most, last))
+        first = last
+
+
 def _add(file: Any, dataset: xarray.Dataset, name: Any, new: str,
          new_of: Mapping[Any, str]) -> None:
     """Adds a field to an open file that has the coordinates."""
@@ -114,12 +128,12 @@ def _add(file: Any, dataset: xarray.Dataset, name: Any, new: str,
     out = file.createVariable(new, kind, dims, fill_value=fill)
     out.set_auto_maskandscale(False)
     out.setncatts(attributes)
-    for index in range(variable.shape[0]):
-        # An entry of a lazy array is read, computed and forgotten.
-        entry = np.asarray(variable[{variable.dims[0]: index}].variable.data)
+    for part in _parts_of(variable):
+        # A part of a lazy array is read, computed and forgotten.
+        values = np.asarray(variable[{variable.dims[0]: part}].variable.data)
         if marks.size:
-            entry = np.where(np.isin(entry, marks), fill, entry)
-        out[index] = _samples(str(name), entry, kind)
+            values = np.where(np.isin(values, marks), fill, values)
+        out[part] = _samples(str(name), values, kind)
 
 
 def _check_room(folder: pathlib.Path, dataset: xarray.Dataset, fields: Sequence[Any]) -> None:

@@ -269,6 +269,28 @@ class Accessors(unittest.TestCase):
         arrays = cube().chunk({"time": 1, "x": 2})
         np.testing.assert_array_equal(self.values(arrays), cube().a[1].values)
 
+    def test_a_chunk_of_dask_is_computed_once_if_it_is_not_large(self):
+        try:
+            import dask.array
+        except ImportError:
+            self.skipTest("dask is not installed")
+        entry = 3 * 4 * 5 * 4  # bytes
+        for most, wanted in ((2 * entry, 3), (entry, 5), (0, 5)):
+            computed = []
+
+            def noted(block):
+                computed.append(block.shape[0])
+                return block
+
+            one = cube().a
+            values = np.concatenate([one.values, one.values + 1, one.values[:1]])
+            source = dask.array.from_array(values, chunks=(2, -1, -1, -1))
+            arrays = cube().isel(time=[0, 0, 0, 0, 0]).assign_coords(time=np.arange(5.0))
+            arrays["a"] = one.dims, source.map_blocks(noted, meta=np.empty((0,) * 4, "f4"))
+            with self.subTest(most), unittest.mock.patch("windsplat._netcdf.READ_BYTES", most):
+                np.testing.assert_array_equal(self.values(arrays, step=3), values[3])
+                self.assertEqual(len(computed), wanted)
+
     def test_what_cannot_be_held_is_named(self):
         refused = (
             (cube("f8") * 1e300, "'a' has values up to 5.9e.301; the server keeps float32, at"),
