@@ -51,7 +51,7 @@ class Visit {
     } as unknown as Status;
     const host = {
       document: () => this.view,
-      runs: () => this.runs,
+      busy: () => this.runs,
       restore: (view: View) => void this.restored.push(view),
     };
     this.address = new Address(host, status, "http://host/a/");

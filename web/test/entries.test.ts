@@ -5,6 +5,7 @@ import { test } from "node:test";
 import { entryOf, openEntry, type EntryApi } from "../src/app/entries";
 import { entryControls } from "../src/app/entry_picker";
 import { ProblemError, type OpeningJob, type Dataset, type View } from "@windsplat/client";
+import { hashOfView, viewOfHash } from "../src/view/link";
 import { described, Page, problem } from "./page";
 
 const members = (chosen: string): Dataset["choices"] => [
@@ -138,6 +139,33 @@ test("a link to a member that the server does not list opens it", async () => {
     assert.equal(page.sent("open").at(-1)!.dataset, "gcm,number=5");
     const patch = page.sent("patch").at(-1)!.patch as View;
     assert.deepEqual([patch.dataset, patch.camera], ["gcm,number=5", camera], `again ${again}`);
+  }
+});
+
+test("the address keeps a link to a member while that is opened", async () => {
+  const failed = { id: "7", state: "failed", result: null, problem: problem("it is damaged") };
+  for (const answers of [fifthAnswers, { "POST v1/datasets": failed }]) {
+    const page = new Page([gcm]);
+    opened(page, gcm);
+    const link = hashOfView({ dataset: "gcm,number=5" });
+    const { location } = window;
+    const due: (() => void)[] = [];
+    const rest = () => due.splice(0).at(-1)?.();
+    Object.assign(window, {
+      setTimeout: (run: () => void) => due.push(run),
+      history: {
+        replaceState: (_state: null, _title: string, hash: string) => (location.hash = hash),
+      },
+    });
+    serve(answers);
+    location.hash = link; // the user goes there
+    page.app.openView({ dataset: "gcm,number=5" });
+    rest();
+    assert.equal(location.hash, link, "until the server has opened it");
+    await settled();
+    rest();
+    const shown = answers === fifthAnswers ? fifth.id : gcm.id;
+    assert.equal(viewOfHash(location.hash)?.dataset, shown);
   }
 });
 

@@ -16,8 +16,9 @@ import type { Status } from "./status";
 
 export interface AddressHost {
   document(): View; // explicit keys only
-  // whether playback or line motion is active; the address is updated once both have stopped
-  runs(): boolean;
+  // whether playback or line motion is active, or the view of another address waits for its files
+  // to be opened; the address is updated once that has ended
+  busy(): boolean;
   restore(view: View): void; // the user has navigated to another address
   // the second picture, which is kept behind the view
   beside?: { readonly suffix: string; take(hash: string): string };
@@ -125,7 +126,7 @@ export class Address {
   }
 
   private write(): void {
-    if (this.link !== "followed" || this.host.runs()) return;
+    if (this.link !== "followed" || this.host.busy()) return;
     const hash = hashOfView(this.host.document()) + (this.host.beside?.suffix ?? "");
     if (window.location.hash !== hash) window.history.replaceState(null, "", hash);
   }

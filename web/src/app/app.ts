@@ -140,7 +140,7 @@ export class App {
     this.address = new Address(
       {
         document: () => this.model.state.document,
-        runs: () => this.playback.running || this.flowing.running,
+        busy: () => this.playback.running || this.flowing.running || this.opener.opensEntry,
         restore: (view) => this.undoControl.edit(() => this.restore(view)),
         beside: parts.beside,
       },
@@ -179,7 +179,7 @@ export class App {
             entry,
             wanted,
             (ms) => new Promise((done) => this.clock.setTimeout(done, ms)),
-          ),
+          ).finally(() => this.address.save()),
         later: () => this.undoControl.later(),
         showEntries: (refusal) => {
           if (refusal !== undefined) entries.refuse(refusal);

@@ -53,6 +53,7 @@ export class DatasetOpener {
   private before: View | undefined; // view of the displayed dataset when another was requested
   private abandonedId = 0; // id of the newest cancelled `open`
   private waits = false; // `opened` has not arrived yet
+  private entryId = 0; // number of the newest opening of other entries, before its `open`
   private named: string | undefined; // the dataset that the page's address named
   private abandonedRev = 0; // last rev of a view whose dataset could not be opened
   private restored = new Set<number>(); // revs of the view that replaced a refused one
@@ -66,6 +67,11 @@ export class DatasetOpener {
 
   get waiting(): boolean {
     return this.waits;
+  }
+
+  // Whether the view asked for last is not yet that of the model, as its entries are being opened.
+  get opensEntry(): boolean {
+    return this.waits && this.openId === this.entryId;
   }
 
   choose(id: string): void {
@@ -273,6 +279,7 @@ export class DatasetOpener {
     const run = host.later();
     this.startWaiting(entryText(entry));
     const openId = this.openId;
+    this.entryId = openId;
     const wanted = (): boolean => this.waits && this.openId === openId;
     host.openEntry(entry, wanted).then(
       (dataset) => {
