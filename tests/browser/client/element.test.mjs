@@ -4,19 +4,20 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { test } from "node:test";
 import { assertDrawn, shot } from "../support.mjs";
-import { event, finalOf, pixelsOf, sessions, sessionsOpened, sharedSite, toldOf } from "./site.mjs";
+import {
+  event,
+  finalOf,
+  pixelsOf,
+  sessions,
+  sessionsOpened,
+  sharedSite,
+  toldOf,
+  until,
+} from "./site.mjs";
 
 const shared = sharedSite({ args: ["tornado", "climate"] });
 const tornado = `<windsplat-view id="a" src="SRC" dataset="tornado"></windsplat-view>`;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-
-const until = async (page, holds, what) => {
-  for (let n = 0; n < 300; n++) {
-    if (await holds()) return;
-    await page.waitForTimeout(30);
-  }
-  assert.fail(what);
-};
 
 async function drag(page, selector, dx, dy) {
   const box = await page.locator(selector).boundingBox();

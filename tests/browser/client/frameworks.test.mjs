@@ -2,7 +2,7 @@
 // are set again with every rendering, and removed as null or undefined.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { event, finalOf, sessions, sessionsOpened, sharedSite, toldOf } from "./site.mjs";
+import { event, finalOf, sessions, sessionsOpened, sharedSite, toldOf, until } from "./site.mjs";
 
 const shared = sharedSite({ args: ["tornado", "climate"] });
 
@@ -31,14 +31,6 @@ const seen = (page) =>
     const { view, camera, pick, controls } = document.querySelector("#a");
     return { view, eye: camera?.eye, pick, controls };
   });
-
-async function until(page, holds, what) {
-  for (let n = 0; n < 300; n++) {
-    if (await holds()) return;
-    await page.waitForTimeout(30);
-  }
-  assert.fail(what);
-}
 
 test("elements that come and go leave no stream; one that moves keeps its own", async (t) => {
   const page = await framework(t);

@@ -114,6 +114,15 @@ export async function event(page, name, accepts = () => true) {
   }
 }
 
+// Waits until `holds` gives true; `what` is what it stands for.
+export async function until(page, holds, what) {
+  const late = Date.now() + 15_000 * patience;
+  while (!(await holds())) {
+    if (Date.now() > late) throw new Error(`not in time: ${what}`);
+    await page.waitForTimeout(30);
+  }
+}
+
 // The final picture of the newest view. Input is sent with the next display frame.
 export const finalOf = (page, selector = "windsplat-view") =>
   page.evaluate(
