@@ -11,13 +11,14 @@ import type {
   SavedView,
   Service,
 } from "../generated/answers";
-import { Api, type Probe } from "../wire/api";
-import { addressOf, settingsOf } from "../wire/arguments";
+import type { Probe } from "../wire/api";
+import { addressOf, queryOf, settingsOf } from "../wire/arguments";
 import type { SocketClass } from "../wire/browser_link";
 import { drawFrame, waitFor, type FetchLike, type Wait } from "../wire/frame_request";
 import type { View } from "../wire/protocol";
 import { isForeign } from "../wire/reach";
 import { posted, ProblemError, problemText, UnreachableError } from "../wire/requests";
+import { DataApi } from "./data_api";
 import { ViewStream, type StreamEvents, type StreamOptions } from "./view_stream";
 
 export interface ClientOptions {
@@ -84,10 +85,7 @@ const pollMostMs = 1000;
 const isSaved = (answer: Record<string, unknown>): boolean =>
   typeof answer.id === "string" && typeof answer.view === "object";
 
-export class Client extends Api {
-  readonly url: string; // ends with a slash
-  private readonly send: FetchLike;
-
+export class Client extends DataApi {
   // url: of the server, with its base path; a host with its port counts as http://.
   constructor(
     url: string | URL,
@@ -98,10 +96,7 @@ export class Client extends Api {
     base.search = "";
     base.hash = "";
     const fetchIt = options.fetch ?? ((to: string, init: RequestInit) => fetch(to, init));
-    const send = reaching(base.href, authorized(fetchIt, options.token));
-    super(base.href, (to, init) => send(to, init ?? {}));
-    this.url = base.href;
-    this.send = send;
+    super(base.href, reaching(base.href, authorized(fetchIt, options.token)));
   }
 
   // --- the stream ------------------------------------------------------------------------
@@ -189,11 +184,7 @@ export class Client extends Api {
   /** Every field at the sample nearest to a place in the coordinates of the dataset. */
   async probeAt(id: string, place: Place, signal?: AbortSignal): Promise<Probe> {
     const { fields, ...numbers } = settingsOf("a place such as { x: 0, y: 0, z: 0 }", place);
-    const query = new URLSearchParams(
-      Object.entries(numbers)
-        .filter(([, value]) => value !== undefined)
-        .map(([key, value]) => [key, String(value)]),
-    );
+    const query = queryOf(numbers);
     if (fields !== undefined && fields.length > 0) query.set("fields", fields.join(","));
     return this.getProbe(`${this.dataset(id)}/probe?${query}`, { signal: signal ?? null });
   }

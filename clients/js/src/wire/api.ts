@@ -212,7 +212,7 @@ export class Api {
     return `v1/datasets/${encodeURIComponent(nameOf("id", id))}`;
   }
 
-  private field(id: string, field: string): string {
+  protected field(id: string, field: string): string {
     return `${this.dataset(id)}/fields/${encodeURIComponent(nameOf("field", field))}`;
   }
 

@@ -31,6 +31,23 @@ export function settingsOf<T extends object>(wanted: string, value: T): T {
   return is ? value : refuse("the last argument", wanted, value);
 }
 
+/** Settings as parameters of a query; lists are joined by commas. */
+export const queryOf = (settings: object): URLSearchParams =>
+  new URLSearchParams(
+    Object.entries(settings)
+      .filter(([, value]) => value !== undefined)
+      .map(([key, value]) => [key, String(value)]),
+  );
+
+export type Bytes = Blob | ArrayBuffer | Uint8Array | string;
+
+/** A body whose length is known before it is sent; a stream has none. */
+export function bytesOf(name: string, value: Bytes): BodyInit {
+  const is = value instanceof Blob || value instanceof ArrayBuffer || ArrayBuffer.isView(value);
+  if (is || typeof value === "string") return value as BodyInit;
+  return refuse(name, "a Blob, an ArrayBuffer, a Uint8Array or a text", value);
+}
+
 /** The address of a server; a host with its port counts as http://. */
 export function addressOf(url: string | URL): URL {
   const text = String(url).trim();
