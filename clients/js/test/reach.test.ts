@@ -77,7 +77,9 @@ test("the error of a server that refuses the page says so, with the origin to al
   const error = await new Client(server, { fetch }).datasets().catch((one: unknown) => one);
   assert.ok(error instanceof UnreachableError);
   assert.equal(error.foreign, true);
-  const text = `${server} answers, but does not allow pages of ${site} (--allow-origin)`;
+  const text =
+    `${server} answers, but not for pages of ${site}: ` +
+    "it does not allow them (--allow-origin), or a proxy answers in its place";
   assert.equal(error.message, text);
   assert.equal((error.cause as Error).message, "Failed to fetch");
   assert.deepEqual(asked, [`${server}v1/datasets`, livez]);

@@ -37,7 +37,8 @@ test("an origin that is not allowed is told so, and how to allow it", async (t) 
   const { origin } = new URL(closed.daemon.url);
   assert.equal(
     detail.message,
-    `${origin} answers, but does not allow pages of ${closed.site.origin} (--allow-origin)`,
+    `${origin} answers, but not for pages of ${closed.site.origin}: ` +
+      "it does not allow them (--allow-origin), or a proxy answers in its place",
   );
   assert.equal(await page.locator("[part=message]").innerText(), detail.message);
   await shot(page, "foreign-page-refused");

@@ -1,7 +1,8 @@
 // What a page of another origin says of a server that gives it no answer: that it is down, or that
-// it does not allow the page.
+// it, or a proxy in its place, does not allow the page.
 import assert from "node:assert/strict";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
@@ -19,7 +20,8 @@ const locked = sharedSite({ allowed: false, args: ["--token-file", file, "tornad
 const viewOf = (src) => `<windsplat-view id="a" src="${src}" dataset="tornado"></windsplat-view>`;
 
 const refusal = (server, { site }) =>
-  `${server} answers, but does not allow pages of ${site.origin} (--allow-origin)`;
+  `${server} answers, but not for pages of ${site.origin}: ` +
+  "it does not allow them (--allow-origin), or a proxy answers in its place";
 const originOf = ({ url }) => new URL(url).origin;
 
 // The message of the element's first error, which it also shows.
@@ -61,6 +63,21 @@ test("a server that is down gives no answer, to the client and the element", asy
   assert.equal(await shownBy(page), `no answer from ${down}`);
   const text = `no answer from ${down}/ (Failed to fetch)`;
   assert.deepEqual(await failures(page, down), twice(true, false, text));
+});
+
+test("a proxy whose server is down may be why the page is refused", async (t) => {
+  const proxy = createServer((_, response) => response.writeHead(502).end("Bad Gateway"));
+  await new Promise((listens) => proxy.listen(0, "127.0.0.1", listens));
+  t.after(() => {
+    proxy.close();
+    proxy.closeAllConnections();
+  });
+  const url = `http://127.0.0.1:${proxy.address().port}`;
+  const page = await closed.pageWith(t, viewOf(url));
+  const shown = await shownBy(page);
+  assert.equal(shown, refusal(url, closed));
+  assert.match(shown, /a proxy answers in its place/);
+  assert.deepEqual(await failures(page, url), twice(true, true, refusal(`${url}/`, closed)));
 });
 
 test("a server with a token tells pages that it does not allow the same", async (t) => {

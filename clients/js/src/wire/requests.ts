@@ -19,7 +19,7 @@ export class ProblemError extends Error {
 
 /**
  * A request had no answer that this program may read: the server is down or its address is wrong,
- * or, if `foreign`, it does not allow pages of this origin.
+ * or, if `foreign`, what answers does not allow pages of this origin.
  */
 export class UnreachableError extends Error {
   override name = "UnreachableError";
@@ -41,9 +41,13 @@ export class UnreachableError extends Error {
  */
 export const ownOrigin = (): string | undefined => (globalThis as { origin?: string }).origin;
 
-/** Text on a server that does not allow pages of the origin of this one. */
+/**
+ * Text on a server whose answers this page may not read. The browser does not tell whether they are
+ * its own, or those of a proxy whose server is down.
+ */
 export const refusesPages = (server: string): string =>
-  `${server} answers, but does not allow pages of ${ownOrigin()} (--allow-origin)`;
+  `${server} answers, but not for pages of ${ownOrigin()}: ` +
+  "it does not allow them (--allow-origin), or a proxy answers in its place";
 
 /** The entries of a problem with their places, or else its detail or title. */
 export function problemText({ title, detail, errors }: Problem): string {
