@@ -1,7 +1,7 @@
 // What the client says to wrong arguments and of a server that is down.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Client, UnreachableError } from "../src/index";
+import { Client, problemText, UnreachableError } from "../src/index";
 
 const noRequest = () => Promise.reject(new Error("a request was sent"));
 const server = new Client("http://host/", { fetch: noRequest });
@@ -42,4 +42,26 @@ test("wrong arguments are refused by name before anything is sent", async () => 
   await says("histogram", ["a", "t", "last", 8], /^step must be a whole number from 0, not "last"/);
   await says("range", ["a", "t"], /^step must be/);
   await says("describe", [], /^id must be a name/);
+  const noView = /^view must be an object such as { dataset: "a" }, not "hurricane"/;
+  for (const name of ["frame", "saveView", "forecast", "picture", "stream"]) {
+    await says(name, ["hurricane"], noView);
+  }
+  await says("pick", ["hurricane", [1, 2]], noView);
+  await says("rangeIn", ["hurricane", "a", "t"], noView);
+  await says("replaceView", ["k7", "hurricane"], noView);
+  const promised = wrong.frame!("hurricane");
+  await assert.rejects(promised, TypeError, "as a promise");
+});
+
+test("a problem of a whole document has a place, too", () => {
+  const problem = { type: "/problems/invalid-value", title: "No", status: 422, detail: "d" };
+  const errors = [{ pointer: "", detail: "must be an object" }] as const;
+  assert.equal(problemText({ ...problem, errors: [...errors] }), "the document: must be an object");
+});
+
+test("the error of a program without a WebSocket says where to pass one", (t) => {
+  const own = Object.getOwnPropertyDescriptor(globalThis, "WebSocket");
+  Reflect.deleteProperty(globalThis, "WebSocket");
+  t.after(() => own && Object.defineProperty(globalThis, "WebSocket", own));
+  assert.throws(() => server.stream({}), /the package ws, in new Client\(url, { webSocket }\)$/);
 });

@@ -179,7 +179,7 @@ console.log((await stream.final()).header.width);
 stream.close();
 `);
   const lines = told.trim().split("\n");
-  assert.match(lines[0], /^no WebSocket here/);
+  assert.match(lines[0], /^no WebSocket here.*new Client\(url, { webSocket }\)$/);
   assert.deepEqual(lines.slice(1), ["no answer from the server", "404", "64"]);
 });
 

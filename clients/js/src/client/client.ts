@@ -12,7 +12,7 @@ import type {
   Service,
 } from "../generated/answers";
 import type { Probe } from "../wire/api";
-import { addressOf, queryOf, settingsOf } from "../wire/arguments";
+import { addressOf, queryOf, settingsOf, viewOf } from "../wire/arguments";
 import type { SocketClass } from "../wire/browser_link";
 import { drawFrame, waitFor, type FetchLike, type Wait } from "../wire/frame_request";
 import type { View } from "../wire/protocol";
@@ -104,7 +104,7 @@ export class Client extends DataApi {
   /** Shows a view over a stream of its own, until close(). */
   stream(view: View, events: StreamEvents = {}, options: StreamOptions = {}): ViewStream {
     const { token, webSocket } = this.options;
-    return new ViewStream(this.url, view, events, {
+    return new ViewStream(this.url, viewOf(view), events, {
       token,
       webSocket,
       fetch: this.send,
@@ -115,8 +115,9 @@ export class Client extends DataApi {
   // --- pictures --------------------------------------------------------------------------
 
   /** A view drawn to a picture. A busy server is asked again after the time that it states. */
-  frame(view: View, { signal, ...asked }: PictureOptions = {}): Promise<Blob> {
-    return drawFrame(this.send, this.url, view, signal ?? new AbortController().signal, asked);
+  async frame(view: View, { signal, ...asked }: PictureOptions = {}): Promise<Blob> {
+    const ended = signal ?? new AbortController().signal;
+    return drawFrame(this.send, this.url, viewOf(view), ended, asked);
   }
 
   // --- movies ----------------------------------------------------------------------------
@@ -191,16 +192,17 @@ export class Client extends DataApi {
 
   // --- saved views -----------------------------------------------------------------------
 
-  saveView(view: View): Promise<SavedView> {
-    return this.get<SavedView>("v1/views", isSaved, posted(view));
+  async saveView(view: View): Promise<SavedView> {
+    return this.get<SavedView>("v1/views", isSaved, posted(viewOf(view)));
   }
 
   savedView(id: string): Promise<SavedView> {
     return this.get<SavedView>(this.saved(id), isSaved);
   }
 
-  replaceView(id: string, view: View): Promise<SavedView> {
-    return this.get<SavedView>(this.saved(id), isSaved, { ...posted(view), method: "PUT" });
+  async replaceView(id: string, view: View): Promise<SavedView> {
+    const init = { ...posted(viewOf(view)), method: "PUT" };
+    return this.get<SavedView>(this.saved(id), isSaved, init);
   }
 
   /** patch: a merge patch (RFC 7396). */

@@ -12,7 +12,7 @@ import type {
   Series,
 } from "../generated/answers";
 import type { Dataset, DatasetSummary, View } from "./protocol";
-import { indicesOf, nameOf, settingsOf, stepOf } from "./arguments";
+import { indicesOf, nameOf, settingsOf, stepOf, viewOf } from "./arguments";
 import { notUnderstood, posted, refusal } from "./requests";
 import { isObject } from "../base/values";
 import type { Vec3 } from "../base/vec3";
@@ -108,7 +108,7 @@ export class Api {
   /** The range at the step and in the region of a view. */
   async rangeIn(view: View, id: string, field: string): Promise<FieldRange> {
     const looksRight = (a: Record<string, unknown>) => a.range === null || isRange(a.range);
-    return this.get<FieldRange>(`${this.field(id, field)}/range`, looksRight, posted(view));
+    return this.get<FieldRange>(`${this.field(id, field)}/range`, looksRight, posted(viewOf(view)));
   }
 
   /**
@@ -138,7 +138,7 @@ export class Api {
     type Answer = { feature: Feature | null };
     const path = `v1/picks?x=${x}&y=${y}`;
     const looksRight = (a: Record<string, unknown>) => a.feature === null || isObject(a.feature);
-    return (await this.get<Answer>(path, looksRight, { ...posted(view), signal })).feature;
+    return (await this.get<Answer>(path, looksRight, { ...posted(viewOf(view)), signal })).feature;
   }
 
   /** Reads every step, so it may take a long time. */
@@ -155,7 +155,7 @@ export class Api {
 
   /** The server's forecast for the settings that it may choose for a view. */
   async forecast(view: View): Promise<Forecast> {
-    return this.get<Forecast>("v1/forecasts", (a) => Array.isArray(a.points), posted(view));
+    return this.get<Forecast>("v1/forecasts", (a) => Array.isArray(a.points), posted(viewOf(view)));
   }
 
   async datasets(): Promise<DatasetSummary[]> {
@@ -204,7 +204,11 @@ export class Api {
 
   /** A picture of a view, after the requests of the stream. */
   async picture(view: View, signal: AbortSignal): Promise<Blob> {
-    const init = { ...posted(view, { Accept: "image/jpeg" }), signal, priority: "low" as const };
+    const init = {
+      ...posted(viewOf(view), { Accept: "image/jpeg" }),
+      signal,
+      priority: "low" as const,
+    };
     return (await this.answer("v1/frames", init)).blob();
   }
 

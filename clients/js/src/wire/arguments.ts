@@ -1,6 +1,9 @@
 // Arguments of the client's methods, checked before anything is sent: a TypeError names the
 // argument and what it should have been.
 
+import { isObject } from "../base/values";
+import type { View } from "./protocol";
+
 const shown = (value: unknown): string => JSON.stringify(value) ?? String(value);
 
 function refuse(name: string, wanted: string, value: unknown): never {
@@ -27,8 +30,12 @@ export function indicesOf(value: unknown): number[] {
 
 /** The settings of a method. */
 export function settingsOf<T extends object>(wanted: string, value: T): T {
-  const is = typeof value === "object" && value !== null && !Array.isArray(value);
-  return is ? value : refuse("the last argument", wanted, value);
+  return isObject(value) ? value : refuse("the last argument", wanted, value);
+}
+
+/** A view. What it says is checked by the server. */
+export function viewOf(value: View): View {
+  return isObject(value) ? value : refuse("view", 'an object such as { dataset: "a" }', value);
 }
 
 /** Settings as parameters of a query; lists are joined by commas. */

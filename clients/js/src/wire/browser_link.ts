@@ -27,7 +27,10 @@ export const tokenProtocol = (token: string): string =>
 
 function globalSocket(): SocketClass {
   if (typeof WebSocket === "undefined") {
-    throw new Error("no WebSocket here: Node before 22 needs one, as of the package ws");
+    throw new Error(
+      "no WebSocket here: Node before 22 needs one, as of the package ws, in " +
+        "new Client(url, { webSocket })",
+    );
   }
   return WebSocket;
 }

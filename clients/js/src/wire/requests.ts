@@ -51,7 +51,9 @@ export const refusesPages = (server: string): string =>
 
 /** The entries of a problem with their places, or else its detail or title. */
 export function problemText({ title, detail, errors }: Problem): string {
-  const entries = errors?.map((entry) => `${entry.pointer}: ${entry.detail}`) ?? [];
+  // The empty pointer is that of the whole document.
+  const entries =
+    errors?.map((entry) => `${entry.pointer || "the document"}: ${entry.detail}`) ?? [];
   return entries.length > 0 ? entries.join("; ") : detail || title || "";
 }
 
