@@ -95,13 +95,14 @@ struct Uploads::State {
 
   // Unpacks the archive at a path beside it. Errors: those of loader::unpack(); out_of_memory
   // (quota).
-  Result<void> unpack(const Announced& announced, const fs::path& path) {
+  Result<void> unpack(const Announced& announced, const fs::path& path, const CancelToken& cancel) {
     const fs::path folder = folder_beside(path);
     if (::mkdir(folder.c_str(), S_IRWXU) != 0) return not_stored(errno);
     const auto reserve = [&](std::uint64_t bytes) {
       return take_for(announced, bytes, "unpacked " + std::to_string(bytes));
     };
-    return data::loader::unpack({.archive = path, .folder = folder, .reserve = reserve});
+    return data::loader::unpack(
+        {.archive = path, .folder = folder, .reserve = reserve, .cancel = cancel});
   }
 
   // For an upload that is being received, which has `size` bytes. Errors: out_of_memory.
@@ -362,13 +363,13 @@ Result<void> Incoming::write(std::span<const std::byte> bytes) {
   return {};
 }
 
-Result<Upload> Incoming::finish() {
-  auto upload = publish();
+Result<Upload> Incoming::finish(const CancelToken& cancel) {
+  auto upload = publish(cancel);
   if (!upload) discard();
   return upload;
 }
 
-Result<Upload> Incoming::publish() {
+Result<Upload> Incoming::publish(const CancelToken& cancel) {
   if (written_ != announced_.bytes) {
     return make_error(ErrorKind::invalid, "the upload is shorter than announced");
   }
@@ -380,7 +381,7 @@ Result<Upload> Incoming::publish() {
   }
   const bool archive = is_archive(announced_.id);
   if (archive) {
-    if (const auto ok = state_->unpack(announced_, path_); !ok) return ok.error();
+    if (const auto ok = state_->unpack(announced_, path_, cancel); !ok) return ok.error();
   }
   const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
   const std::lock_guard lock(state_->mutex);

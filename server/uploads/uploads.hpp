@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/uploads/content_digest.hpp"
 
@@ -97,16 +98,16 @@ class Incoming {
 
   // Errors: out_of_memory (quota, disk full), internal (disk).
   Result<void> write(std::span<const std::byte> bytes);
-  // Makes it visible, or discards it. Errors: invalid (another digest than announced); those of
-  // write(); of a ZIP archive, which is unpacked, bad_data.
-  Result<Upload> finish();
+  // Makes it visible, or discards it. Errors: invalid (another digest than announced); cancelled;
+  // those of write(); of a ZIP archive, which is unpacked, bad_data.
+  Result<Upload> finish(const CancelToken& cancel);
 
  private:
   friend class Uploads;
   Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path);
 
   Result<void> open_file();
-  Result<Upload> publish();
+  Result<Upload> publish(const CancelToken& cancel);
   void discard();
 
   const std::shared_ptr<Uploads::State> state_;

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pathlib
+import signal
 import socket
 import struct
 import time
@@ -67,6 +68,10 @@ def special(name, mode):
 class Archives(WithUploads):
     """Zarr stores as ZIP archives."""
 
+    def restart(self, limit):
+        self.daemon.end()
+        self.daemon = Daemon(PROGRAM, "tornado", "--state-dir", self.state, "--upload-limit", limit)
+
     def test_a_store_is_unpacked_and_opened(self):
         for n, (method, prefix) in enumerate(((zipfile.ZIP_STORED, ""), (zipfile.ZIP_DEFLATED, ""),
                                               (zipfile.ZIP_DEFLATED, "storm.zarr/"))):
@@ -93,8 +98,7 @@ class Archives(WithUploads):
         self.assertEqual((self.state / "uploads/a/a.zip/a").read_bytes(), b"x" * 100)
 
     def test_an_archive_of_more_entries_than_the_plain_form_has(self):
-        self.daemon.end()
-        self.daemon = Daemon(PROGRAM, "tornado", "--state-dir", self.state, "--upload-limit", "2G")
+        self.restart("2G")
         body = zipped({f"{n}": b"%d" % n for n in range(70_000)})
         self.assertEqual(self.put("a.zip", body).status, 201)
         self.assertEqual(len(self.files()), 70_000)
@@ -125,6 +129,53 @@ class Archives(WithUploads):
                     pass
         self.assertIn(b" 201 ", answer)
         self.assertIn("2", seen)
+
+    def begun(self, name, body):
+        """A connection over which an upload was sent whole."""
+        client = socket.create_connection(self.daemon.host.split(":"))
+        client.sendall(f"PUT /v1/uploads/{name} HTTP/1.1\r\nHost: {self.daemon.host}\r\n"
+                       f"Content-Length: {len(body)}\r\n\r\n".encode() + body)
+        return client
+
+    def loaders(self):
+        """Processes that unpack."""
+        found = []
+        for task in pathlib.Path(f"/proc/{self.daemon.process.pid}/task").iterdir():
+            try:
+                found += map(int, (task / "children").read_text().split())
+            except OSError:  # a thread has ended
+                pass
+        return found
+
+    def stop_loaders(self, count):
+        """Waits until so many unpack, and stops them."""
+        stopped = set()
+
+        def are_stopped():
+            for one in set(self.loaders()) - stopped:
+                os.kill(one, signal.SIGSTOP)
+                stopped.add(one)
+            return len(stopped) >= count
+
+        self.wait_until(are_stopped)
+
+    def test_the_end_of_the_daemon_does_not_wait_for_an_archive(self):
+        self.restart("1G")
+        with self.begun("a.zip", zipped({f"{n}": b"x" for n in range(20_000)})):
+            self.stop_loaders(1)
+            begun = time.monotonic()
+            self.daemon.end()
+            self.assertLess(time.monotonic() - begun, 11)
+        self.assertFalse((self.state / "uploads").exists())
+
+    def test_an_archive_whose_client_has_left_is_discarded(self):
+        self.restart("1G")
+        body = zipped({f"{n}": b"x" for n in range(20_000)})
+        client = self.begun("a.zip", body)
+        self.wait_until(lambda: len(self.files()) > 1)
+        client.close()
+        self.wait_until(lambda: self.files() == [])
+        self.assertEqual(self.put("a.zip", zipped({"a": b"x"})).status, 201)
 
     def test_hostile_archives_are_refused_and_leave_nothing(self):
         good = zipped({"a": b"x" * 100, "b": b"y"})

@@ -65,8 +65,8 @@ class UploadSink final : public http::BodySink {
 
   void answer(const http::Request& request, http::Reply reply) override {
     run_later(disk_, request, std::move(reply), "an upload", nullptr,
-              [into = into_, base_path = base_path_] {
-                const auto upload = into->finish();
+              [into = into_, base_path = base_path_, cancel = request.cancel] {
+                const auto upload = into->finish(cancel);
                 if (!upload) return http::problem_response(upload.error());
                 http::Response response = upload_response(*upload);
                 response.status = 201;

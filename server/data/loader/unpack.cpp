@@ -27,6 +27,9 @@ namespace {
 
 constexpr std::chrono::seconds time_at_first{60};
 constexpr std::uint64_t bytes_per_second = 10'000'000;
+constexpr std::chrono::milliseconds look_every{100};  // whether it was cancelled
+// Of the end of a message, from its first byte on.
+constexpr std::chrono::milliseconds message_time{5'000};
 
 Error not_stored(int fault) { return disk_error(fault, "the archive cannot be unpacked"); }
 
@@ -110,6 +113,21 @@ class Written {
   std::uint64_t blocks_left_ = 0;
 };
 
+// The next message. Errors: cancelled.
+Result<Fate> hear(int socket, const Unpacking& what, Clock::time_point end, Message& heard) {
+  end = std::min(end, Clock::now() + what.stall_time);
+  for (;;) {
+    if (what.cancel.cancelled()) {
+      return make_error(ErrorKind::cancelled, "the unpacking was cancelled");
+    }
+    const Fate fate = wait_for_message(socket, std::min(end, Clock::now() + look_every));
+    if (fate == Fate::late && Clock::now() < end) continue;
+    if (fate != Fate::done) return fate;
+    return receive_message(socket, heard, question_bytes_max, Descriptors::refused,
+                           std::min(end, Clock::now() + message_time));
+  }
+}
+
 // One message of the loader. The value: that was the last.
 Result<bool> take(const Message& heard, const Unpacking& what, Written& written,
                   Clock::time_point& end) {
@@ -148,8 +166,9 @@ Result<void> unpack(const Unpacking& what) {
   bool is_first = true;
   while (fate == Fate::done) {
     Message heard;
-    fate = receive_message(process.socket(), heard, question_bytes_max, Descriptors::refused,
-                           std::min(end, Clock::now() + what.stall_time));
+    const auto received = hear(process.socket(), what, end, heard);
+    if (!received) return received.error();
+    fate = *received;
     if (fate != Fate::done) break;
     // What follows is bounded by the first message; room is reserved once.
     const bool opens = heard.kind == Kind::entries;

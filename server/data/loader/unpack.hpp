@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/files/descriptor.hpp"
 
@@ -20,10 +21,12 @@ struct Unpacking {
   std::function<Result<void>(std::uint64_t bytes)> reserve;
   // A loader that sends nothing for so long is ended.
   std::chrono::milliseconds stall_time{15'000};
+  CancelToken cancel = {};
 };
 
 // Errors: bad_data (of the archive, or a loader that crashed, stalled or sent what is invalid),
-// out_of_memory (disk full), internal (disk), those of `reserve`; some files then remain.
+// out_of_memory (disk full), internal (disk), cancelled, those of `reserve`; some files then
+// remain.
 Result<void> unpack(const Unpacking& what);
 
 // In the loader, confined: sends the contents of an archive to the daemon.

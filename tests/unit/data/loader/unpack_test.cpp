@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <thread>
 
 #include "tests/unit/data/loader/faulty_loader.hpp"
 
@@ -108,6 +109,31 @@ TEST_F(HostileUnpacker, OneThatEndsOrStallsIsAnError) {
   EXPECT_THAT(refusal_of("reserve(8192)\nos._exit(7)"), HasSubstr("ended with code 7"));
   what_.stall_time = std::chrono::milliseconds(300);
   EXPECT_THAT(refusal_of("time.sleep(60)"), HasSubstr("took too long"));
+}
+
+TEST_F(HostileUnpacker, CancellingEndsItWithinAMoment) {
+  std::thread later([cancel = what_.cancel] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    cancel.cancel();
+  });
+  const auto begun = Clock::now();
+  const auto silent = unpack_from("reserve(8192)\ntime.sleep(60)");
+  later.join();
+  ASSERT_FALSE(silent);
+  EXPECT_EQ(silent.error().kind, ErrorKind::cancelled);
+  EXPECT_LT(Clock::now() - begun, std::chrono::seconds(8));
+}
+
+TEST_F(HostileUnpacker, CancellingEndsOneThatNeverPauses) {
+  what_.reserve = [cancel = what_.cancel](std::uint64_t) {
+    cancel.cancel();
+    return Result<void>();
+  };
+  const auto done = unpack_from(
+      "reserve(4096)\nsend('entry', b'a')\nsend('entry_bytes', b'x')\nsend('unpacked')");
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::cancelled);
+  EXPECT_TRUE(std::filesystem::is_empty(what_.folder));
 }
 
 TEST_F(HostileUnpacker, ARefusedReservationWritesNothing) {
