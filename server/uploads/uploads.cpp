@@ -385,6 +385,7 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
   }
   const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
   const std::lock_guard lock(state_->mutex);
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the upload was cancelled");
   const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
   if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST) {
     return not_stored(errno);

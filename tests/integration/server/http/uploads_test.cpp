@@ -61,6 +61,20 @@ class UploadThreads : public testing::Test {
   std::unique_ptr<TestServer> server_;
 };
 
+TEST_F(UploadThreads, OneWhoseClientHasLeftIsDiscardedAtTheEnd) {
+  const auto uploads = Uploads::open({root_ / "others", quota_bytes}).value();
+  const auto into = uploads->begin({.id = "a.nc", .bytes = 1, .digest = {}, .address = "a"});
+  ASSERT_TRUE(into) << into.error().message;
+  ASSERT_TRUE((*into)->write(std::vector<std::byte>(1)));
+  const windsplat::CancelToken cancel;
+  cancel.cancel();
+  const auto done = (*into)->finish(cancel);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, windsplat::ErrorKind::cancelled);
+  EXPECT_FALSE(uploads->find("a.nc"));
+  EXPECT_TRUE(uploads->begin({.id = "a.nc", .bytes = 1, .digest = {}, .address = "a"}));
+}
+
 std::string body_of(int seed, std::size_t bytes) {
   std::string out(bytes, '\0');
   auto state = static_cast<std::uint32_t>(seed * 2654435761U + 1U);
