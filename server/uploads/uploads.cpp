@@ -23,7 +23,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t id_chars_max = 80;
-constexpr std::size_t uploads_max = 256;  // that are complete
+constexpr std::size_t uploads_max = 256;
+constexpr std::size_t uploads_per_address = uploads_max / 2;
+constexpr std::uint64_t block_bytes = 4096;  // an upload takes at least one of the quota
 constexpr std::size_t at_a_time_max = 16;
 constexpr std::size_t at_a_time_per_address = 4;
 constexpr const char* incomplete = ".incomplete";  // no id begins with a dot
@@ -34,6 +36,16 @@ bool is_id_letter(char c) {
 }
 
 Error not_stored(int fault) { return disk_error(fault, "the upload cannot be stored"); }
+
+std::uint64_t charge_of(std::uint64_t bytes) {
+  return bytes == 0 ? 0 : std::max(bytes, block_bytes);
+}
+
+Error too_many(std::size_t kept, const std::string& whose) {
+  return make_error(ErrorKind::out_of_memory, std::to_string(kept) +
+                                                  " uploads are kept, as many as " + whose +
+                                                  "; delete some or wait until they expire");
+}
 
 bool is_archive(const std::string& id) { return id.ends_with(".zip"); }
 
@@ -91,6 +103,7 @@ struct Uploads::State {
   struct Share {
     std::uint64_t bytes = 0;
     std::size_t at_a_time = 0;
+    std::size_t kept = 0;  // complete, each with bytes
   };
 
   // Unpacks the archive at a path beside it. Errors: those of loader::unpack(); out_of_memory
@@ -99,13 +112,13 @@ struct Uploads::State {
     const fs::path folder = folder_beside(path);
     if (::mkdir(folder.c_str(), S_IRWXU) != 0) return not_stored(errno);
     const auto reserve = [&](std::uint64_t bytes) {
-      return take_for(announced, bytes, "unpacked " + std::to_string(bytes));
+      return take_for(announced, bytes, "unpacked takes " + std::to_string(bytes));
     };
     return data::loader::unpack(
         {.archive = path, .folder = folder, .reserve = reserve, .cancel = cancel});
   }
 
-  // For an upload that is being received, which has `size` bytes. Errors: out_of_memory.
+  // For an upload that is being received, which `size` ("takes 5") bytes. Errors: out_of_memory.
   Result<void> take_for(const Announced& announced, std::uint64_t bytes, const std::string& size) {
     const std::lock_guard lock(mutex);
     if (bytes > left_for(announced.address)) return no_room(announced.address, size);
@@ -135,7 +148,7 @@ struct Uploads::State {
     return std::min(options.bytes_max - bytes_taken, options.bytes_max / 2 - own);
   }
   [[nodiscard]] Error no_room(const std::string& address, const std::string& size) const {
-    return make_error(ErrorKind::out_of_memory, "the upload has " + size + " bytes, and " +
+    return make_error(ErrorKind::out_of_memory, "the upload " + size + " bytes, and " +
                                                     std::to_string(left_for(address)) +
                                                     " are left of --upload-limit " +
                                                     std::to_string(options.bytes_max) +
@@ -152,9 +165,25 @@ struct Uploads::State {
     receiving.erase(id);
     --shares[address].at_a_time;
   }
+  // Errors: busy; out_of_memory (too many).
+  [[nodiscard]] Result<void> check_count(const std::string& address) const {
+    const auto share = shares.find(address);
+    const Share taken = share == shares.end() ? Share{} : share->second;
+    if (receiving.size() >= at_a_time_max || taken.at_a_time >= at_a_time_per_address) {
+      return Error{ErrorKind::busy, "too many uploads at a time", {}, 1};
+    }
+    if (taken.kept + taken.at_a_time >= uploads_per_address) {
+      return too_many(uploads_per_address, "an address may have");
+    }
+    if (entries.size() + receiving.size() >= uploads_max) {
+      return too_many(uploads_max, "all addresses may have");
+    }
+    return {};
+  }
   // The id is free again; its room only after remove_files().
   Dropped drop(std::map<std::string, Entry>::iterator at) {
     Dropped out{std::move(at->second), options.folder / incomplete / std::to_string(count++)};
+    --shares[out.entry.address].kept;
     entries.erase(at);
     const fs::path path = options.folder / path_of(out.entry.upload.id);
     std::error_code fault;
@@ -251,13 +280,10 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
   if (state.entries.contains(id) || state.receiving.contains(id)) {
     return make_error(ErrorKind::conflict, "an upload '" + id + "' exists: delete it first");
   }
-  const auto share = state.shares.find(address);
-  const State::Share taken = share == state.shares.end() ? State::Share{} : share->second;
-  if (state.receiving.size() >= at_a_time_max || taken.at_a_time >= at_a_time_per_address ||
-      state.entries.size() + state.receiving.size() >= uploads_max) {
-    return Error{ErrorKind::busy, "too many uploads at a time", {}, 1};
+  if (const auto ok = state.check_count(address); !ok) return ok.error();
+  if (charge_of(bytes) > state.left_for(address)) {
+    return state.no_room(address, "takes " + std::to_string(charge_of(bytes)));
   }
-  if (bytes > state.left_for(address)) return state.no_room(address, std::to_string(bytes));
   state.receiving[id] = 0;
   ++state.shares[address].at_a_time;
   const fs::path path = state.options.folder / incomplete / std::to_string(state.count++);
@@ -350,8 +376,9 @@ Result<void> Incoming::write(std::span<const std::byte> bytes) {
     return make_error(ErrorKind::invalid, "the upload is longer than announced");
   }
   if (auto ok = open_file(); !ok) return ok;
-  const std::string size = std::to_string(announced_.bytes);
-  if (auto ok = state_->take_for(announced_, bytes.size(), size); !ok) return ok;
+  const std::uint64_t more = charge_of(written_ + bytes.size()) - charge_of(written_);
+  const std::string size = "takes " + std::to_string(charge_of(announced_.bytes));
+  if (auto ok = state_->take_for(announced_, more, size); !ok) return ok;
   for (auto rest = bytes; !rest.empty();) {
     const ssize_t done = ::write(file_, rest.data(), rest.size());
     if (done < 0 && errno == EINTR) continue;
@@ -398,12 +425,15 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
     std::error_code fault;
     fs::remove(path_, fault);
     fs::remove_all(folder_beside(path_), fault);
-    state_->release(announced_.address, announced_.bytes);
-    taken -= announced_.bytes;
+    // Its folder takes a block, even if it is empty.
+    const std::uint64_t spare = std::min(charge_of(announced_.bytes), taken - block_bytes);
+    state_->release(announced_.address, spare);
+    taken -= spare;
   }
   const Upload upload{announced_.id, announced_.bytes, digest,
                       std::time(nullptr) + announced_.keep_s};
   state_->end_receiving(announced_.id, announced_.address);
+  ++state_->shares[announced_.address].kept;
   state_->entries[announced_.id] = {upload, announced_.address, taken, {}};
   return upload;
 }

@@ -23,7 +23,7 @@ inline constexpr int keep_s_max = 7 * 86400;
 
 struct Options {
   std::filesystem::path folder;  // private; uploads are removed from it at both ends
-  std::uint64_t bytes_max = 0;   // of all files; one address may have half of it
+  std::uint64_t bytes_max = 0;   // of all files, 4 KiB at least; one address may have half of it
 };
 
 struct Upload {
@@ -69,7 +69,7 @@ class Uploads {
 
   // Takes the id, and room as bytes arrive; does not wait for a disk. Errors: invalid (id, no
   // bytes); too_large (for one address); conflict (an upload of that id exists); busy (too many at
-  // a time); out_of_memory (more than what is left of the quota).
+  // a time); out_of_memory (more than what is left of the quota, or too many are kept).
   Result<std::shared_ptr<Incoming>> begin(const Announced& announced);
   // Errors: not_found.
   [[nodiscard]] Result<Upload> find(const std::string& id) const;

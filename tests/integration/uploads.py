@@ -165,6 +165,27 @@ class Uploads(WithUploads):
             self.assert_refused(self.put("c.raw", b"x"), 409, "exists")
         self.wait_until(lambda: self.put("b.raw", bytes(half)).status == 201)
 
+    def test_an_address_keeps_half_of_all_uploads(self):
+        for n in range(128):
+            self.assertEqual(self.put(f"{n}.raw", b"x", "?keep=604800").status, 201)
+        answer = self.put("more.raw", b"x")
+        self.assert_refused(answer, 507, "128 uploads are kept, as many as an address may have")
+        self.assertNotIn("Retry-After", answer.headers)
+        other = http.client.HTTPConnection(self.daemon.host, source_address=("127.0.0.2", 0))
+        self.addCleanup(other.close)
+        other.request("PUT", "/v1/uploads/other.raw", b"x")
+        self.assertEqual(other.getresponse().status, 201)
+        self.daemon.ask("DELETE", "/v1/uploads/0.raw")
+        self.assertEqual(self.put("more.raw", b"x").status, 201)
+
+    def test_an_upload_takes_a_block_at_least(self):
+        self.assertEqual(self.put("a.raw", bytes(LIMIT // 2 - 8192)).status, 201)
+        self.assertEqual(self.put("b.raw", b"x").status, 201)
+        self.assertEqual(self.put("c.raw", b"x").status, 201)
+        self.assert_refused(self.put("d.raw", b"x"), 507, "takes 4096 bytes", "0 are left")
+        self.daemon.ask("DELETE", "/v1/uploads/b.raw")
+        self.assertEqual(self.put("d.raw", bytes(4096)).status, 201)
+
     def test_a_slow_client_holds_no_room_that_it_has_not_filled(self):
         half = LIMIT // 2
         with self.begun("slow.raw", half, 300_000) as slow:
