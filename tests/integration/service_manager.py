@@ -152,6 +152,23 @@ class UnderAManager(unittest.TestCase):
             self.assertTrue(before_us <= int(told_us) <= time.monotonic_ns() // 1000)
             self.assertEqual(manager.message(), serving + end)
 
+    def test_a_manager_that_does_not_read_delays_neither_reload_nor_end(self):
+        manager = self.start()
+        self.assertIn("READY=1", manager.message())
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+            other.setblocking(False)
+            with self.assertRaises(BlockingIOError):
+                while True:
+                    other.sendto(b"x", manager.told.getsockname())
+        manager.daemon.send_signal(signal.SIGHUP)
+        time.sleep(3)
+        begun = time.monotonic()
+        manager.daemon.send_signal(signal.SIGTERM)
+        code, log = manager.ended()
+        self.assertEqual(code, 0)
+        self.assertLess(time.monotonic() - begun, 4)
+        self.assertLess(log.index("configuration reloaded"), log.index("draining"))
+
     def test_no_watchdog_unless_asked_by_the_manager_of_this_process(self):
         manager = self.start(WATCHDOG_USEC="2000", WATCHDOG_PID="1")
         self.assertIn("READY=1", manager.message())

@@ -88,8 +88,8 @@ class Control {
     if (server_ == nullptr) _exit(exit_ok);
     log::info("draining");  // log it before the drain can complete
     draining_ = true;
-    manager_->stopping();
     server_->drain();
+    manager_->stopping();  // may wait
   }
 
   // Called on one thread. Deferred until the server exists.

@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
@@ -24,7 +25,8 @@
 namespace windsplat::cli {
 namespace {
 
-constexpr int first_passed = 3;  // SD_LISTEN_FDS_START
+constexpr int first_passed = 3;    // SD_LISTEN_FDS_START
+constexpr timeval patience{1, 0};  // with a manager that does not read
 
 // The value of a variable, which is removed; empty if it is not set.
 std::string taken(const char* name) {
@@ -115,7 +117,9 @@ int connected_to(const std::string& name) {
   if (name.front() == '@') address.sun_path[0] = '\0';
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size());
   const int socket = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (socket >= 0 && ::connect(socket, reinterpret_cast<sockaddr*>(&address), size) == 0) {
+  if (socket >= 0 &&
+      ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience) == 0 &&
+      ::connect(socket, reinterpret_cast<sockaddr*>(&address), size) == 0) {
     return socket;
   }
   log::warn("the service manager cannot be told of the state",
