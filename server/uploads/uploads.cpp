@@ -141,6 +141,15 @@ struct Uploads::State {
     release(entry.address, entry.taken);
   }
 
+  // The same of an archive that was unpacked, gigabytes perhaps.
+  void remove_archive(const fs::path& path, const std::string& address, std::uint64_t charged) {
+    std::error_code fault;
+    fs::remove(path, fault);
+    fs::remove_all(folder_beside(path), fault);
+    const std::lock_guard lock(mutex);
+    release(address, charged);
+  }
+
   // The others require the mutex.
   [[nodiscard]] std::uint64_t left_for(const std::string& address) const {
     const auto share = shares.find(address);
@@ -148,12 +157,11 @@ struct Uploads::State {
     return std::min(options.bytes_max - bytes_taken, options.bytes_max / 2 - own);
   }
   [[nodiscard]] Error no_room(const std::string& address, const std::string& size) const {
-    return make_error(ErrorKind::out_of_memory, "the upload " + size + " bytes, and " +
-                                                    std::to_string(left_for(address)) +
-                                                    " are left of --upload-limit " +
-                                                    std::to_string(options.bytes_max) +
-                                                    ", of which an address may have half; delete "
-                                                    "uploads, or wait until they expire");
+    return make_error(ErrorKind::out_of_memory,
+                      "the upload " + size + " bytes, and " + std::to_string(left_for(address)) +
+                          " are left of --upload-limit " + std::to_string(options.bytes_max) +
+                          ", of which an address may have half; delete "
+                          "uploads, or wait until they expire");
   }
   void release(const std::string& address, std::uint64_t bytes) {
     bytes_taken -= bytes;
@@ -410,31 +418,28 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
   if (archive) {
     if (const auto ok = state_->unpack(announced_, path_, cancel); !ok) return ok.error();
   }
-  const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
-  const std::lock_guard lock(state_->mutex);
-  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the upload was cancelled");
-  const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
-  if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST) {
-    return not_stored(errno);
+  Upload upload{announced_.id, announced_.bytes, digest, 0};
+  std::uint64_t spare = 0;  // bytes that are released when the archive is removed
+  {
+    const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
+    const std::lock_guard lock(state_->mutex);
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the upload was cancelled");
+    const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
+    if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST) {
+      return not_stored(errno);
+    }
+    if (::rename(from.c_str(), path.c_str()) != 0) return not_stored(errno);
+    ended_ = true;
+    upload.expires = std::time(nullptr) + announced_.keep_s;
+    const std::uint64_t taken = state_->receiving[announced_.id];
+    // The folder of an archive takes a block, even if it is empty.
+    if (archive) spare = std::min(charge_of(announced_.bytes), taken - block_bytes);
+    state_->end_receiving(announced_.id, announced_.address);
+    ++state_->shares[announced_.address].kept;
+    state_->entries[announced_.id] = {upload, announced_.address, taken - spare, {}};
   }
-  if (::rename(from.c_str(), path.c_str()) != 0) return not_stored(errno);
   ::close(file_);
-  ended_ = true;
-  std::uint64_t taken = state_->receiving[announced_.id];
-  if (archive) {
-    std::error_code fault;
-    fs::remove(path_, fault);
-    fs::remove_all(folder_beside(path_), fault);
-    // Its folder takes a block, even if it is empty.
-    const std::uint64_t spare = std::min(charge_of(announced_.bytes), taken - block_bytes);
-    state_->release(announced_.address, spare);
-    taken -= spare;
-  }
-  const Upload upload{announced_.id, announced_.bytes, digest,
-                      std::time(nullptr) + announced_.keep_s};
-  state_->end_receiving(announced_.id, announced_.address);
-  ++state_->shares[announced_.address].kept;
-  state_->entries[announced_.id] = {upload, announced_.address, taken, {}};
+  if (archive) state_->remove_archive(path_, announced_.address, spare);
   return upload;
 }
 
