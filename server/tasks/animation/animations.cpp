@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -26,17 +27,29 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::of(const data::Descriptor&
 
 MappedFile::~MappedFile() { ::munmap(const_cast<std::uint8_t*>(bytes_.data()), bytes_.size()); }
 
+template <class Unwanted>
+Animations::Entries Animations::take(const Unwanted& unwanted) {
+  Entries out;
+  for (auto at = entries_.begin(); at != entries_.end();) {
+    const auto next = std::next(at);
+    if (unwanted(*at)) out.splice(out.end(), entries_, at);
+    at = next;
+  }
+  return out;
+}
+
 void Animations::keep(Kept kept, Clock::time_point now) {
+  Entries removed;  // declared before the lock: destroyed after it
   const std::lock_guard lock(mutex_);
-  std::erase_if(entries_, [&](const Entry& old) {
+  removed = take([&](const Entry& old) {
     return old.until <= now || old.kept.description.id == kept.description.id;
   });
   entries_.push_back({std::move(kept), now + lasts});
   std::int64_t bytes = 0;
   for (const Entry& one : entries_) bytes += one.kept.description.bytes;
-  while (bytes > kept_bytes_max) {
+  while (bytes > kept_bytes_max || entries_.size() > kept_max) {
     bytes -= entries_.front().kept.description.bytes;
-    entries_.pop_front();
+    removed.splice(removed.end(), entries_, entries_.begin());
   }
 }
 
@@ -50,14 +63,16 @@ std::optional<Animations::Kept> Animations::find(const std::string& id, Clock::t
 }
 
 bool Animations::remove(const std::string& id) {
+  Entries removed;
   const std::lock_guard lock(mutex_);
-  return std::erase_if(entries_, [&](const Entry& one) { return one.kept.description.id == id; }) >
-         0;
+  removed = take([&](const Entry& one) { return one.kept.description.id == id; });
+  return !removed.empty();
 }
 
 void Animations::expire(Clock::time_point now) {
+  Entries removed;
   const std::lock_guard lock(mutex_);
-  std::erase_if(entries_, [&](const Entry& one) { return one.until <= now; });
+  removed = take([&](const Entry& one) { return one.until <= now; });
 }
 
 }  // namespace windsplat::tasks

@@ -1,7 +1,9 @@
-// Finished animations: files without a name, kept for a while and within a limit on their bytes.
+// Finished animations: files without a name, kept for a while and within limits on their number and
+// bytes.
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <list>
 #include <memory>
@@ -43,6 +45,7 @@ class Animations {
   static constexpr double render_s_max = 3600;  // expected, of all pictures of one
   static constexpr std::int64_t bytes_max = std::int64_t{256} << 20;     // of one
   static constexpr std::int64_t kept_bytes_max = std::int64_t{1} << 30;  // of all
+  static constexpr std::size_t kept_max = 256;  // each is a mapping and a file
   static constexpr std::chrono::seconds lasts{3600};
 
   struct Kept {
@@ -51,7 +54,8 @@ class Animations {
     std::shared_ptr<const MappedFile> file;
   };
 
-  // The oldest ones make room. Files that are being sent exist until that ends.
+  // The oldest ones make room. Files that are being sent exist until that ends. Here and below,
+  // removed files are released after the lock, for which the network thread waits.
   void keep(Kept kept, Clock::time_point now = Clock::now());
   [[nodiscard]] std::optional<Kept> find(const std::string& id,
                                          Clock::time_point now = Clock::now());
@@ -65,8 +69,13 @@ class Animations {
     Kept kept;
     Clock::time_point until;
   };
+  using Entries = std::list<Entry>;
+  // Moves out those for which `unwanted` holds. Requires the mutex.
+  template <class Unwanted>
+  [[nodiscard]] Entries take(const Unwanted& unwanted);
+
   std::mutex mutex_;
-  std::list<Entry> entries_;  // oldest first
+  Entries entries_;  // oldest first
 };
 
 }  // namespace windsplat::tasks

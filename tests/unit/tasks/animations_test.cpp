@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <future>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "server/movie/output.hpp"
 
@@ -41,6 +45,52 @@ TEST(KeptAnimations, TheOldestMakeRoomForNewOnes) {
   kept.keep(animation_of("d", third));
   EXPECT_FALSE(kept.find("a"));
   for (const char* id : {"b", "c", "d"}) EXPECT_TRUE(kept.find(id)) << id;
+}
+
+TEST(KeptAnimations, AreLimitedInNumberHoweverSmall) {
+  Animations kept;
+  const auto count = static_cast<int>(Animations::kept_max);
+  for (int n = 0; n < count; ++n) kept.keep(animation_of(std::to_string(n), 1));
+  EXPECT_TRUE(kept.find("0"));
+  kept.keep(animation_of("1", 1));  // replaces the second one
+  EXPECT_TRUE(kept.find("0"));
+  kept.keep(animation_of("last", 1));
+  EXPECT_FALSE(kept.find("0"));
+  EXPECT_TRUE(kept.find("1"));
+  EXPECT_TRUE(kept.find("2"));
+}
+
+// Unmapping large files takes time. Here the release of one waits for another thread that needs the
+// lock.
+TEST(KeptAnimations, AreReleasedOutsideOfTheLock) {
+  Animations kept;
+  int released = 0;
+  std::vector<std::future<bool>> others;  // until the test ends
+  const Clock::time_point start;
+  const auto keep = [&](const std::string& id, std::int64_t bytes) {
+    Animations::Kept one = animation_of(id, bytes);
+    const data::Descriptor file = movie::unnamed_file();
+    ASSERT_EQ(::write(file.number(), "movie", 5), 5);
+    auto mapped = MappedFile::of(file);
+    ASSERT_TRUE(mapped);
+    one.file =
+        std::shared_ptr<const MappedFile>(mapped->get(), [&, held = *mapped](const MappedFile*) {
+          others.push_back(std::async(std::launch::async, [&] { return kept.remove("none"); }));
+          const auto found = others.back().wait_for(std::chrono::seconds(5));
+          if (found == std::future_status::ready) ++released;
+        });
+    kept.keep(std::move(one), start);
+  };
+  keep("replaced", 1);
+  keep("replaced", 1);
+  EXPECT_EQ(released, 1);
+  kept.remove("replaced");
+  EXPECT_EQ(released, 2);
+  keep("makes room", 1);
+  keep("large", Animations::kept_bytes_max);
+  EXPECT_EQ(released, 3);
+  kept.expire(start + Animations::lasts);
+  EXPECT_EQ(released, 4);
 }
 
 TEST(KeptAnimations, OneIsRemoved) {
