@@ -80,8 +80,10 @@ Result<tasks::AnimationWork> read_work(tasks::Backend& backend, access::Admissio
   if (auto found = movie::check_encoder(asked->format); !found) {
     return make_error_at(found.error().kind, "/format", found.error().message);
   }
-  return tasks::AnimationWork{asked->view, asked->format, std::move(*motion), std::move(*dataset),
-                              body};
+  tasks::AnimationWork work{asked->view, asked->format, std::move(*motion), std::move(*dataset),
+                            body};
+  work.picture_ms = picture_ms;
+  return work;
 }
 
 http::Response begin(tasks::Backend& backend, access::Admission& admission,
@@ -92,7 +94,8 @@ http::Response begin(tasks::Backend& backend, access::Admission& admission,
   if (auto refusal = admission.picture(address)) return *refusal;
   tasks::Jobs::Terms terms;
   terms.slow = true;
-  auto ticket = backend.references.admit(address, terms.cancel);
+  auto ticket =
+      backend.references.admit(address, terms.cancel, tasks::References::Drawn::animation);
   if (!ticket) return http::problem_response(ticket.error());
   read->payer = address;
   read->base_path = base_path;

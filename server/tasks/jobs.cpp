@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <list>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -146,7 +147,7 @@ struct Jobs::State {
   mutable std::mutex mutex;
   std::list<Shared> jobs;
   std::uint64_t next_id = 1;
-  const std::shared_ptr<const void> one_slow = std::make_shared<int>(0);  // their key
+  std::map<std::string, std::shared_ptr<const void>> one_slow;  // their keys, by kind
   TaskExecutor threads;  // last: its threads use the members above
 };
 
@@ -173,9 +174,14 @@ Result<protocol::JobDescription> Jobs::submit(std::string kind, Work work, const
   job->id = std::to_string(state_->next_id);
   auto described = describe(*job);
   std::list<State::Shared> entry{job};  // allocated before the task is queued
-  const auto queued =
-      state_->threads.submit({job->cancel, [state = state_.get(), job] { state->run(job); }, true,
-                              terms.slow ? state_->one_slow : nullptr});
+  std::shared_ptr<const void> key;
+  if (terms.slow) {
+    auto& known = state_->one_slow[job->kind];
+    if (!known) known = std::make_shared<int>(0);
+    key = known;
+  }
+  const auto queued = state_->threads.submit(
+      {job->cancel, [state = state_.get(), job] { state->run(job); }, true, std::move(key)});
   if (!queued) return queued.error();
   ++state_->next_id;
   state_->jobs.splice(state_->jobs.end(), entry);

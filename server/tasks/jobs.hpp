@@ -28,7 +28,7 @@ class Jobs {
   using Work = std::function<Result<protocol::JobResult>(const Handle&)>;
   struct Terms {
     CancelToken cancel = {};  // raised to cancel the job
-    bool slow = false;        // slow jobs run one at a time
+    bool slow = false;        // slow jobs of a kind run one at a time
   };
 
   // `tasks_max` is the limit on listed jobs; a new one replaces the oldest finished one.

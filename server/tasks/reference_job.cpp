@@ -47,9 +47,9 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                               handle.cancel, memory);
   if (!begun) return begun.error();
   const std::shared_ptr<frame::ReferenceDrawing> drawing = std::move(*begun);
-  const BackgroundOwner owner{backend.references.next_owner(), payer};
+  BackgroundOwner owner{backend.references.next_owner(), payer};
   while (drawing->done() < 1) {
-    const auto drawn = in_background(backend, owner, handle.cancel,
+    const auto drawn = in_background(backend.renderer, owner, handle.cancel,
                                      [&backend, drawing](const CancelToken& stop) -> Result<void> {
                                        const auto until = Clock::now() + strip_time;
                                        drawing->draw(*backend.pool, stop,
@@ -61,7 +61,7 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
   }
   const auto difference = std::make_shared<frame::Difference>();
   const auto compared =
-      in_background(backend, owner, handle.cancel,
+      in_background(backend.renderer, owner, handle.cancel,
                     [&backend, drawing, difference](const CancelToken& stop) -> Result<void> {
                       const auto found = drawing->compare(*backend.pool, stop, backend.frames);
                       if (!found) return found.error();

@@ -39,8 +39,8 @@ std::optional<References::Kept> References::find(const std::string& id) {
   return *found;
 }
 
-Result<References::Ticket> References::admit(const std::string& address,
-                                             const CancelToken& cancel) {
+Result<References::Ticket> References::admit(const std::string& address, const CancelToken& cancel,
+                                             Drawn kind) {
   const std::lock_guard lock(mutex_);
   std::erase_if(wanted_,
                 [](const Wanted& one) { return one.ticket.expired() || one.cancel.cancelled(); });
@@ -51,15 +51,16 @@ Result<References::Ticket> References::admit(const std::string& address,
         "a reference or an animation is being drawn for this address; cancel its job or wait for "
         "it");
   }
-  if (wanted_.size() >= wanted_max) {
+  const auto of_kind = std::count_if(wanted_.begin(), wanted_.end(),
+                                     [&](const Wanted& one) { return one.kind == kind; });
+  if (static_cast<std::size_t>(of_kind) >= wanted_max) {
     std::string detail = std::to_string(wanted_max);
-    detail +=
-        " references and animations are waiting or being drawn, which is the limit; try again "
-        "later";
+    detail += kind == Drawn::reference ? " references" : " animations";
+    detail += " are waiting or being drawn, which is the limit; try again later";
     return too_many(std::move(detail));
   }
   auto ticket = std::make_shared<const char>();
-  wanted_.push_back({address, cancel, ticket});
+  wanted_.push_back({address, cancel, kind, ticket});
   return Ticket(std::move(ticket));
 }
 

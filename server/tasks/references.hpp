@@ -22,7 +22,7 @@ namespace windsplat::tasks {
 class References {
  public:
   static constexpr std::size_t bytes_max = std::size_t{32} << 20;  // limit on encoded pictures
-  static constexpr std::size_t wanted_max = 4;                     // waiting or being drawn
+  static constexpr std::size_t wanted_max = 4;  // of a kind, waiting or being drawn
 
   struct Kept {
     protocol::ReferenceDescription description;
@@ -33,10 +33,12 @@ class References {
   void keep(Kept kept);
   std::optional<Kept> find(const std::string& id);
 
-  // Admits one drawing, also of an animation, valid while the value is held and `cancel` is not
-  // raised; one at a time per address. Errors: busy.
+  enum class Drawn { reference, animation };
+  // Admits one drawing, valid while the value is held and `cancel` is not raised; one of either
+  // kind at a time per address. Errors: busy.
   using Ticket = std::shared_ptr<const void>;
-  Result<Ticket> admit(const std::string& address, const CancelToken& cancel);
+  Result<Ticket> admit(const std::string& address, const CancelToken& cancel,
+                       Drawn kind = Drawn::reference);
   // Owner id of render jobs; distinct from all connection ids.
   std::uint64_t next_owner() { return ~owners_++; }
 
@@ -44,6 +46,7 @@ class References {
   struct Wanted {
     std::string address;
     CancelToken cancel;
+    Drawn kind;
     std::weak_ptr<const void> ticket;
   };
 

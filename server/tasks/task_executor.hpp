@@ -62,8 +62,10 @@ inline constexpr std::size_t requests_waiting_max = 16;
 // All executors of the server (docs/design/overview.md). The spare threads are for loads that hang
 // or wait for memory.
 inline constexpr TaskExecutor::Settings load_settings{"loads", 2, requests_waiting_max, 4};
+// A reference and an animation may run for an hour beside each other: the spare thread is for
+// others.
 inline constexpr TaskExecutor::Settings job_settings{"jobs", protocol::limits::jobs_running_max,
-                                                     protocol::limits::jobs_max};
+                                                     protocol::limits::jobs_max, 1};
 // Resolves posted names: a slow disk delays no other executor.
 inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, requests_waiting_max};
 // Changes saved views; each change may take one disk sync.

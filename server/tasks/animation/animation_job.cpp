@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <system_error>
 #include <utility>
@@ -44,12 +45,12 @@ Result<PreparedPtr> prepare(Backend& backend, const AnimationWork& work, const p
 
 // The pixels of a view: 8-bit sRGB.
 Result<image::Bytes> draw(Backend& backend, const AnimationWork& work, const protocol::View& view,
-                          const BackgroundOwner& owner, const CancelToken& cancel) {
+                          BackgroundOwner& owner, const CancelToken& cancel) {
   const auto prepared = prepare(backend, work, view, cancel);
   if (!prepared) return prepared.error();
   const auto drawn = std::make_shared<image::Bytes>();
   const auto done = in_background(
-      backend, owner, cancel,
+      backend.renderer, owner, cancel,
       [&backend, drawn, picture = *prepared,
        dataset = work.dataset](const CancelToken& stop) -> Result<void> {
         data::Dataset resident = dataset->resident_only();
@@ -73,6 +74,18 @@ Result<std::int64_t> size_of(const data::Descriptor& file) {
                         " MiB; choose fewer or smaller pictures, or mp4 in place of zip");
 }
 
+// The error of picture n; where the time is over it names the limit.
+Error with_time(Error error, const BackgroundOwner& owner, int n, int frames) {
+  const bool late = error.kind == ErrorKind::busy && BackgroundOwner::Clock::now() >= *owner.until;
+  if (!late) return error;
+  error.message = "an animation is drawn for at most " +
+                  std::to_string(static_cast<int>(Animations::render_s_max)) + " s, and " +
+                  std::to_string(n) + " of " + std::to_string(frames) +
+                  " pictures are drawn; choose fewer or smaller ones, or try again when the server "
+                  "is less busy";
+  return error;
+}
+
 Result<std::int64_t> write_frames(Backend& backend, const AnimationWork& work,
                                   const Jobs::Handle& handle, const data::Descriptor& file) {
   const movie::Motion& motion = work.motion;
@@ -90,12 +103,14 @@ Result<std::int64_t> write_frames(Backend& backend, const AnimationWork& work,
         handle.cancel);
   });
   if (!base) return base.error();
-  const BackgroundOwner owner{backend.references.next_owner(), work.payer};
+  constexpr std::chrono::seconds time_max(static_cast<std::int64_t>(Animations::render_s_max));
+  BackgroundOwner owner{backend.references.next_owner(), work.payer, work.picture_ms,
+                        BackgroundOwner::Clock::now() + time_max};
   for (int n = 0; n < motion.frames(); ++n) {
     const auto view = motion.view_of(n, work.view, *base);
     if (!view) return view.error();
     const auto pixels = draw(backend, work, *view, owner, handle.cancel);
-    if (!pixels) return pixels.error();
+    if (!pixels) return with_time(pixels.error(), owner, n, motion.frames());
     if (auto added = (*writer)->add(*pixels); !added) return added.error();
     if (auto fits = size_of(file); !fits) return fits;
     handle.report_progress((n + 1.0) / motion.frames());

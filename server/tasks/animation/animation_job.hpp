@@ -22,12 +22,13 @@ struct AnimationWork {
   std::string text;        // that decides all of this, of which the id is made
   std::string payer = {};  // address charged with the drawing
   std::string base_path = {};
+  double picture_ms = 0;  // estimate of the time for one
 };
 
 // Returns at once if it is kept already, otherwise blocks until it is finished. Cancellation takes
 // effect within about a tenth of a second, except while loading; no file remains. Errors:
-// cancelled; too_large above Animations::bytes_max; those of frame::complete(), prepare_picture()
-// and movie::Writer.
+// cancelled; too_large above Animations::bytes_max; busy after Animations::render_s_max; those of
+// frame::complete(), prepare_picture() and movie::Writer.
 Result<protocol::JobResult> draw_animation(Backend& backend, const AnimationWork& work,
                                            const Jobs::Handle& handle);
 

@@ -1,26 +1,39 @@
-// Work of client jobs on the renderer's thread while that is otherwise idle.
+// Work of client jobs on the renderer's thread while that is otherwise idle, or, where it was
+// interrupted often, in its turn.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
-#include "server/tasks/backend.hpp"
+#include "server/tasks/render_service.hpp"
 
 namespace windsplat::tasks {
 
-// Owner of the render jobs and the address charged.
+// After so many interruptions a piece of work is drawn as a request, which nothing interrupts.
+inline constexpr int interruptions_max = 3;
+// Work drawn so takes at most one part in so many of the time.
+inline constexpr int insisting_parts = 4;
+
+// The work of one job: whom it is charged to, and when it has to end.
 struct BackgroundOwner {
-  std::uint64_t owner = 0;
-  std::string payer;
+  using Clock = std::chrono::steady_clock;
+  std::uint64_t owner = 0;  // of the render jobs
+  std::string payer;        // address charged
+  double cost_ms = 0;       // estimate of a piece; 0: unknown
+  std::optional<Clock::time_point> until = {};
+  Clock::time_point insists_from = {};  // before it the next piece is only drawn in the background
 };
 
 // Runs `draw` on the renderer's thread as a background job, again after each interruption, until
-// its result is not `cancelled` or the job is cancelled. Copies `draw`, which may outlive the call
-// briefly. Errors: those of `draw`; cancelled.
-Result<void> in_background(Backend& backend, const BackgroundOwner& owner,
+// its result is not `cancelled` or the job is cancelled; after `interruptions_max` of them as a
+// request of the payer. Copies `draw`, which may outlive the call briefly. Errors: those of `draw`;
+// cancelled; busy after `until`.
+Result<void> in_background(RenderService& renderer, BackgroundOwner& owner,
                            const CancelToken& unwanted,
                            const std::function<Result<void>(const CancelToken& stop)>& draw);
 

@@ -140,6 +140,29 @@ TEST(Jobs, SlowJobsLeaveAThreadToOthers) {
   for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
 }
 
+TEST(Jobs, SlowJobsOfOneKindLeaveAThreadToThoseOfAnotherAndToOthers) {
+  Gate gate;
+  Jobs jobs(windsplat::tasks::job_settings);
+  const auto pass = [&](const Jobs::Handle&) {
+    gate.pass();
+    return Result<protocol::JobResult>("x");
+  };
+  Jobs::Terms slow;
+  slow.slow = true;
+  std::vector<std::string> ids;
+  for (const char* kind : {"animation", "animation", "reference", "reference"}) {
+    ids.push_back(jobs.submit(kind, pass, slow)->id);
+  }
+  gate.wait_for_inside(2);
+  ids.push_back(submitted(jobs, pass));
+  gate.wait_for_inside(3);
+  std::vector<std::string> states;
+  for (const auto& job : jobs.list()) states.push_back(job.state);
+  EXPECT_THAT(states, ElementsAre("running", "queued", "running", "queued", "running"));
+  gate.open();
+  for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
+}
+
 TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   Gate gate;
   Jobs jobs({"jobs", 1, 8});

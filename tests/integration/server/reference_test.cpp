@@ -209,7 +209,7 @@ TEST(References, InvalidViewIsRefusedWithItsPointer) {
   EXPECT_EQ(json_of(get(server.port(), "/v1"))["links"]["references"], "/v1/references");
 }
 
-TEST(ReferenceTickets, OnePerAddressAndFourInTotal) {
+TEST(ReferenceTickets, OnePerAddressAndFourOfAKind) {
   References references;
   const CancelToken unwanted;
   const auto first = references.admit("a", unwanted);
@@ -220,6 +220,7 @@ TEST(ReferenceTickets, OnePerAddressAndFourInTotal) {
   const auto d = references.admit("d", {});
   ASSERT_TRUE(b && c && d);
   EXPECT_FALSE(references.admit("e", {})) << "four are waiting";
+  EXPECT_TRUE(references.admit("e", {}, References::Drawn::animation)) << "which are references";
   b->reset();
   const auto e = references.admit("e", {});
   EXPECT_TRUE(e) << "one has ended";
