@@ -68,8 +68,8 @@ Result<tasks::AnimationWork> read_work(tasks::Backend& backend, access::Admissio
   if (!checked) return in_view(checked.error());
   auto dataset = tasks::find_shown(backend.catalogue, view);
   if (!dataset) return in_view(dataset.error());
-  auto motion =
-      movie::Motion::of(std::move(asked->motion), view, (*dataset)->info(), checked->steps);
+  auto motion = movie::Motion::of(std::move(asked->motion), view, (*dataset)->info(),
+                                  checked->steps, Animations::frames_max);
   if (!motion) return motion.error();
   const double picture_ms =
       backend.request_times.estimate_ms(view.dataset, view.method.name, checked->cost.kernels);
@@ -77,6 +77,10 @@ Result<tasks::AnimationWork> read_work(tasks::Backend& backend, access::Admissio
     return in_view(fits.error());
   }
   if (auto fits = check_length(*motion, view, picture_ms); !fits) return fits.error();
+  if (auto fits = movie::check_video_size(asked->format, view.image.width, view.image.height);
+      !fits) {
+    return in_view(make_error_at(fits.error().kind, "/image", fits.error().message));
+  }
   if (auto found = movie::check_encoder(asked->format); !found) {
     return make_error_at(found.error().kind, "/format", found.error().message);
   }

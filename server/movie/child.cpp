@@ -176,7 +176,9 @@ Error Child::failed(int status) const {
   if (said.size() > said_bytes_max) said.erase(0, said.size() - said_bytes_max);
   std::replace(said.begin(), said.end(), '\n', ' ');
   if (!said.empty()) text += ": " + printable(said, 1000);
-  return make_error(ErrorKind::internal, std::move(text));
+  const bool full =
+      said.find("No space left on device") != std::string::npos;  // ENOSPC in LC_ALL=C
+  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(text));
 }
 
 Result<void> Child::finish(const CancelToken& cancel) {

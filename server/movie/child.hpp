@@ -37,7 +37,7 @@ class Child {
   ~Child();  // kills it
 
   // Writes all bytes, waiting while the program does not read. Errors: internal with the program's
-  // message if it ended; cancelled.
+  // message if it ended, or out_of_memory if that says that the disk is full; cancelled.
   Result<void> write(std::span<const std::uint8_t> bytes, const CancelToken& cancel);
 
   // Ends its input and waits for its end. Errors: internal if it fails, with its message;

@@ -138,6 +138,14 @@ Result<void> check_encoder(Container container) {
   return {};
 }
 
+Result<void> check_video_size(Container container, int width, int height) {
+  if (!needs_ffmpeg(container) || static_cast<double>(width) * height <= video_pixels_max)
+    return {};
+  return make_error(ErrorKind::too_large,
+                    "a picture of a video has at most 9437184 pixels (4096 x 2304): choose a "
+                    "smaller one, or zip as the format");
+}
+
 std::vector<std::string> arguments_of(const Options& options, const std::string& encoder, int width,
                                       int height) {
   const std::string size = std::to_string(width) + 'x' + std::to_string(height);
@@ -150,13 +158,14 @@ std::vector<std::string> arguments_of(const Options& options, const std::string&
                  "flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p"});
   append(words, {"-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1",
                  "-color_range", "tv", "-c:v", encoder.c_str()});
+  // Both hold that many pictures in memory to look ahead, of 40 and 25 by default.
   if (encoder == "libx264") {
-    append(words, {"-preset", "medium", "-crf", "18"});
+    append(words, {"-preset", "medium", "-crf", "18", "-rc-lookahead", "10"});
   } else if (encoder == "libopenh264") {
     append(words, {"-b:v", bit_rate(options, width, height).c_str()});
   } else {
-    append(words,
-           {"-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1"});
+    append(words, {"-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1",
+                   "-lag-in-frames", "10"});
   }
   if (options.threads > 0) append(words, {"-threads", std::to_string(options.threads).c_str()});
   if (options.container == Container::mp4) append(words, {"-movflags", "+faststart"});

@@ -32,6 +32,12 @@ Result<std::string> choose_encoder(const Ffmpeg& ffmpeg, Container container);
 // choose_encoder().
 Result<void> check_encoder(Container container);
 
+// Pixels of a picture of a video: an encoder holds many pictures in memory. 4096x2304.
+inline constexpr double video_pixels_max = 4096.0 * 2304;
+
+// Whether pictures of this size are encoded by a server; a ZIP may have any. Errors: too_large.
+Result<void> check_video_size(Container container, int width, int height);
+
 // Arguments that read raw pictures (rgb24) from standard input, `width` x `height` pixels, both
 // even, and write the container to descriptor 3. RGB becomes Y'CbCr by ITU-R BT.709, limited range,
 // and the file says so; the transfer function is that of sRGB (IEC 61966-2-1), as of the pictures.

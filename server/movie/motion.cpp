@@ -29,7 +29,7 @@ Result<void> check_size_is_fixed(const protocol::View& view) {
 }
 
 Result<Motion> Motion::of(protocol::AnimationMotion asked, const protocol::View& view,
-                          const data::DatasetInfo& info, int step_count) {
+                          const data::DatasetInfo& info, int step_count, int frames_max) {
   Motion out;
   out.asked_ = std::move(asked);
   if (auto steps = out.choose_steps(step_count); !steps) return steps.error();
@@ -43,7 +43,8 @@ Result<Motion> Motion::of(protocol::AnimationMotion asked, const protocol::View&
   const bool lines_move =
       view.vector.motion == protocol::MotionMode::phase && draws_lines(view, info);
   if (auto valid = out.check_effect(lines_move); !valid) return valid.error();
-  for (int n = 0; out.path_ && n < out.frames_; ++n) {  // before an hour of drawing
+  const int looked_at = out.path_ && out.frames_ <= frames_max ? out.frames_ : 0;
+  for (int n = 0; n < looked_at; ++n) {  // before an hour of drawing
     if (const auto camera = out.camera(n, {}); !camera) return at_path(camera.error());
   }
   return out;

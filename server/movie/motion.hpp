@@ -30,9 +30,11 @@ class Motion {
  public:
   // Of `view` as asked for, whose dataset shows `step_count` steps. `info`: what its lines come
   // from. Errors: invalid with the pointer of a value that is not valid or has no effect, as in a
-  // posted animation ("/perStep"); those of CameraPath::of() and at(), at /path.
+  // posted animation ("/perStep"); those of CameraPath::of() and at(), at /path. A path is
+  // looked at only if there are at most `frames_max` pictures, since that takes time for each.
   static Result<Motion> of(protocol::AnimationMotion asked, const protocol::View& view,
-                           const data::DatasetInfo& info, int step_count);
+                           const data::DatasetInfo& info, int step_count,
+                           int frames_max = protocol::animation_frames_max);
 
   [[nodiscard]] int frames() const { return frames_; }
   [[nodiscard]] double fps() const { return fps_; }

@@ -6,10 +6,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <iterator>
 #include <thread>
+#include <utility>
 
 #include "server/movie/child.hpp"
 #include "server/movie/ffmpeg.hpp"
@@ -138,6 +141,28 @@ TEST(MovieWriter, FailuresOfFfmpegAreReportedWithItsMessageAndLeaveNoFile) {
   ::sigaction(SIGPIPE, &before, nullptr);
   EXPECT_THAT(folder.names(), ElementsAre("asked", "ffmpeg", "noted"));
   expect_no_children();
+}
+
+TEST(MovieWriter, AFullDiskOfFfmpegIsThatOfAnArchive) {
+  const MovieFolder folder;
+  put_ffmpeg(folder,
+             "sys.stdin.buffer.read()\n"
+             "sys.exit('av_interleaved_write_frame(): No space left on device')");
+  auto writer = Writer::open(folder.file("out.mp4"), options_of(folder, Container::mp4, 4, 4), {});
+  ASSERT_TRUE(writer) << writer.error().message;
+  const auto done = write_pictures(**writer, 4, 4, 1);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::out_of_memory);
+}
+
+TEST(MovieWriter, EncodersLookAheadByTenPictures) {
+  for (const auto& [encoder, option] :
+       {std::pair("libx264", "-rc-lookahead"), std::pair("libvpx-vp9", "-lag-in-frames")}) {
+    const auto words = arguments_of({}, encoder, 4, 4);
+    const auto at = std::find(words.begin(), words.end(), option);
+    ASSERT_LT(at - words.begin(), std::ssize(words) - 1) << encoder;
+    EXPECT_EQ(*std::next(at), "10");
+  }
 }
 
 TEST(MovieWriter, TheEndOfAMessageIsKept) {

@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -202,6 +204,10 @@ TEST(Animations, RefusalsNameThePlaceAndTheLimit) {
     const char* words;
   };
   const Json turn{{"view", view_of()}, {"format", "zip"}, {"turn", 360}};
+  // Its camera looks upward at its end, which is an error of /path that costs all of its pictures.
+  const Json path{{"keyframes",
+                   {{{"time", 0}, {"camera", {{"eye", {3, -2, 2}}, {"target", {0, 0, 0}}}}},
+                    {{"time", 5000}, {"camera", {{"eye", {0, 0, 2}}, {"target", {0, 0, 0}}}}}}}};
   const auto with = [&](const Json& more) {
     Json body = turn;
     body.merge_patch(more);
@@ -225,6 +231,9 @@ TEST(Animations, RefusalsNameThePlaceAndTheLimit) {
            {with({{"frames", 3601}}), 413, "/frames", "3600 pictures"},
            {with({{"frames", 3600}, {"view", {{"image", {{"width", 1280}, {"height", 900}}}}}}),
             413, "/frames", "4000000000 pixels"},
+           {with({{"turn", nullptr}, {"path", path}}), 413, "/frames", "3600 pictures"},
+           {with({{"format", "mp4"}, {"view", {{"image", {{"width", 4097}, {"height", 2304}}}}}}),
+            413, "/view/image", "zip"},
        }) {
     const Answer answer = post_animation(server.port(), each.body);
     EXPECT_EQ(answer.status, each.status) << each.body << answer.body;
@@ -260,6 +269,27 @@ TEST(Animations, OneAtATimeForAnAddressAndACancelledOneEnds) {
   EXPECT_EQ(request(server.port(), "DELETE", "/v1/jobs/" + id).status, 204);
   EXPECT_EQ(finished_job(server.port(), id)["state"], "cancelled");
   EXPECT_EQ(animated(server.port(), {{"view", view_of()}, {"format", "zip"}})["state"], "done");
+}
+
+TEST(Animations, AreFinishedWhileOthersDrawAllTheTime) {
+  TestServer server;
+  std::atomic<bool> over{false};
+  std::atomic<int> drawn{0};
+  std::thread viewer([&] {
+    for (int n = 0; !over; ++n) {
+      const std::string size = "width=" + std::to_string(64 + n % 500) + "&height=48";
+      if (get(server.port(), "/v1/datasets/small/frame.jpg?" + size).status == 200) ++drawn;
+    }
+  });
+  const Json job =
+      animated(server.port(), {{"view", view_of({{"image", {{"width", 1600}, {"height", 1200}}}})},
+                               {"format", "zip"},
+                               {"turn", 360},
+                               {"frames", 3}});
+  over = true;
+  viewer.join();
+  EXPECT_EQ(job["state"], "done") << job;
+  EXPECT_GT(drawn, 3);
 }
 
 TEST(Animations, ADrainEndsThem) {
