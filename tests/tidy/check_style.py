@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, classes
-with many members, notes of postponed work, machine-specific paths, names of C++ tests, test folders
-without a test.
+"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, files of
+many bytes, classes with many members, notes of postponed work, machine-specific paths, names of C++
+tests, test folders without a test.
 
 Usage: check_style.py [ROOT]"""
 import collections
@@ -14,6 +14,7 @@ import tree
 
 MAX_LINE = 100
 MAX_FUNCTION_LINES = 80  # "about 70"
+MAX_FILE_BYTES = 1 << 20  # larger ones are written by programs, or fetched
 MAX_FILE_LINES = 500
 MAX_FOLDER_FILES = 30
 MAX_CLASS_MEMBERS = 25  # of the server
@@ -181,6 +182,8 @@ def check(root):
     if (root / "server" / "main.cpp").exists():
         complaints += stale_exceptions(root)
     for path, file in files:
+        if file.stat().st_size > MAX_FILE_BYTES:
+            complaints.append(f"{path}: {file.stat().st_size} bytes")
         content = tree.text(file)
         if content is not None and not GENERATED.fullmatch(path):
             complaints += complaints_about(path, content)

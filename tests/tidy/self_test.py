@@ -197,6 +197,12 @@ class Planted(unittest.TestCase):
         self.expect(check_style, "a.cpp:1: 101 columns", "b.cpp:1: a function of 93 lines",
                     "c.cpp:2: a function of 92 lines", "d.cpp: 700 lines")
 
+    def test_file_of_many_bytes(self):
+        self.plant("pictures/a.bin", "x" * check_style.MAX_FILE_BYTES)
+        self.expect(check_style)
+        self.plant("pictures/a.bin", "x" * (check_style.MAX_FILE_BYTES + 1))
+        self.expect(check_style, "pictures/a.bin: 1048577 bytes")
+
     def test_folder_of_many_files(self):
         for n in range(check_style.MAX_FOLDER_FILES):
             self.plant(f"server/extra/f{n}.hpp", "#pragma once\n")
