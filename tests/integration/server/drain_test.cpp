@@ -95,7 +95,10 @@ TEST(Drain, RemainingConnectionsAreClosedAtTheDeadline) {
 }
 
 TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
-  TestServer server;
+  windsplat::api::ServerOptions options;
+  options.drain_cancel_after = std::chrono::minutes(1);  // a slow build needs more than the default
+  options.drain_abort_after = std::chrono::minutes(2);
+  TestServer server(options);
   Socket drawing(server.port());
   drawing.send(
       "GET /v1/datasets/small/frame.png?width=600&height=600 HTTP/1.1\r\n"

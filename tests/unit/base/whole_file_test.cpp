@@ -68,7 +68,7 @@ TEST_F(WholeFile, FailureKeepsTheOldFileAndLeavesNoPart) {
     written = write_whole_file(path, std::string(1000, 'x'));
   }
   ASSERT_FALSE(written);
-  EXPECT_EQ(written.error().kind, ErrorKind::internal);
+  EXPECT_EQ(written.error().kind, ErrorKind::out_of_memory);
   EXPECT_NE(written.error().message.find("a.png"), std::string::npos);
   EXPECT_EQ(read(path), "good");
   EXPECT_EQ(entries(), 1);
