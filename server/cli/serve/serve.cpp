@@ -160,7 +160,7 @@ class Control {
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
   std::shared_ptr<transport::TlsContext> tls_;  // the newest one
-  std::string serving_;                         // the state in words
+  std::string serving_;                         // status for the service manager
   std::mutex mutex_;                            // guards the members below, held briefly
   transport::Server* server_ = nullptr;
   bool reload_wanted_ = false;
