@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "server/api/operations/parameters.hpp"
 #include "server/data/cf/time.hpp"
 
 namespace windsplat::api {
@@ -183,6 +184,29 @@ Result<std::size_t> step_of_time(const data::DatasetInfo& info, std::string_view
   if (!around->before) return around->after->index;
   return *wanted - around->before->ms <= around->after->ms - *wanted ? around->before->index
                                                                      : around->after->index;
+}
+
+TimeQuery read_time(http::QueryReader& query) {
+  TimeQuery out;
+  out.time = read_text(query, parameters::time);
+  out.nearest = read_boolean(query, parameters::nearest);
+  return out;
+}
+
+Result<std::optional<std::size_t>> step_of(const TimeQuery& query, bool has_step,
+                                           const data::DatasetInfo& info) {
+  if (!query.time) {
+    if (!query.nearest) return std::optional<std::size_t>{};
+    return make_error(ErrorKind::invalid, "query parameter 'nearest' requires 'datetime'");
+  }
+  if (has_step) {
+    return make_error(ErrorKind::invalid,
+                      "query parameters 'step' and 'datetime' are mutually exclusive");
+  }
+  const auto step = step_of_time(info, *query.time,
+                                 query.nearest.value_or(false) ? Match::nearest : Match::exact);
+  if (!step) return step.error();
+  return std::optional(*step);
 }
 
 }  // namespace windsplat::api

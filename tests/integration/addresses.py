@@ -281,6 +281,23 @@ class Probes(unittest.TestCase):
             self.assertEqual(answer.body, self.probe(
                 "globe", f"x={longitude}&y={latitude}&z={level}&step=2").body)
 
+    def test_times_are_steps(self):
+        for path in ("probe?lon=30&lat=0&level=700", "fields/t/histogram?bins=5",
+                     "fields/t/range?of=step", "fields/t/values.npy?level=700"):
+            def asked(query):
+                return self.daemon.get(f"/v1/datasets/globe/{path}&{query}")
+            at = asked("datetime=2001-02-28T12:00Z")
+            self.assertEqual((at.status, at.body), (200, asked("step=2").body), path)
+            self.assertNotEqual(at.body, asked("step=1").body, path)
+            near = asked("datetime=2001-02-28T13:00Z&nearest=true")
+            self.assertEqual((near.status, near.body), (200, at.body), path)
+            for wrong, text in (("datetime=2001-02-28T13:00Z", "no step is at"),
+                                ("datetime=2001-02-28T12:00Z&step=2", "mutually exclusive"),
+                                ("nearest=true", "requires 'datetime'")):
+                answer = asked(wrong)
+                self.assertEqual(answer.status, 422, path)
+                self.assertIn(text, answer.detail()[1])
+
     def test_a_series_takes_them_too(self):
         answer = self.daemon.get("/v1/datasets/globe/fields/t/series?lon=30&lat=-15&level=700")
         self.assertEqual(answer.status, 200, answer.body)

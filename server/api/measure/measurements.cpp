@@ -111,12 +111,14 @@ struct HistogramQuery {
 
 Result<HistogramQuery> read_histogram(http::QueryReader& query, const data::Dataset& dataset) {
   HistogramQuery out;
-  out.step = static_cast<std::size_t>(read_step(query, dataset).value_or(0));
+  const auto step = read_step(query, dataset);
   out.request.bins = read_integer(query, parameters::bins).value_or(histogram_bins);
   out.request.range = read_pair(query, parameters::range);
   out.request.logarithmic = read_boolean(query, parameters::log).value_or(false);
   const auto clip = read_number(query, parameters::clip);
   if (const auto ok = query.finish(); !ok) return ok.error();
+  if (!step) return step.error();
+  out.step = *step;
   out.request.clip = clip.value_or(0);
   if (out.request.range && clip) {
     return make_error(ErrorKind::invalid,
@@ -146,7 +148,7 @@ http::Response histogram_response(const Subject& subject, const HistogramQuery& 
 
 struct ProbeQuery {
   Position position;
-  int step = 0;
+  std::size_t step = 0;
   std::vector<std::string> fields;  // derived ones that are computed; others only if in memory
 };
 
@@ -174,18 +176,18 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
   if (!located) return http::problem_response(located.error());
   protocol::ProbeDescription out;
   out.position = located->position;
-  out.step = query.step;
+  out.step = static_cast<int>(query.step);
   for (const data::FieldInfo& field : info.fields) {
     if (cancel.cancelled()) {
       return http::problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
     }
-    const auto at_step = static_cast<std::size_t>(query.step);
     // Of derived fields those that are wanted or in memory: computing all would take seconds.
     const bool is_wanted =
         std::find(query.fields.begin(), query.fields.end(), field.name) != query.fields.end();
     const bool is_optional = field.derived && !is_wanted;
-    const auto volume = is_optional ? dataset.resident_only().volume(field.name, at_step)
-                                    : load_field(catalogue, dataset, field.name, at_step, cancel);
+    const auto volume = is_optional
+                            ? dataset.resident_only().volume(field.name, query.step)
+                            : load_field(catalogue, dataset, field.name, query.step, cancel);
     if (!volume && is_optional) continue;
     // Fields that cannot be subtracted have no difference.
     if (!volume && !is_wanted && dataset.subtrahend() && volume.error().kind == ErrorKind::invalid)
@@ -259,25 +261,22 @@ void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, cons
 
 void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                const http::Request& request, http::Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
   http::QueryReader query(request.query);
   auto dataset = find_dataset(catalogue, id, query);
-  if (!dataset) {
-    reply(http::problem_response(dataset.error()));
-    return;
-  }
+  if (!dataset) return refuse(dataset.error());
   const auto at = read_position(query, (*dataset)->info().grid);
-  const int step = read_step(query, **dataset).value_or(0);
+  const auto step = read_step(query, **dataset);
   const auto wanted = read_fields(query, (*dataset)->info());
   const auto ok = query.finish();
-  if (!ok || !at || !wanted) {
-    reply(http::problem_response(!ok ? ok.error() : !at ? at.error() : wanted.error()));
-    return;
-  }
+  if (!ok) return refuse(ok.error());
+  if (!at) return refuse(at.error());
+  if (!step) return refuse(step.error());
+  if (!wanted) return refuse(wanted.error());
   run_later(
       loads, request, std::move(reply), "a probe", dataset->get(),
-      [&catalogue, dataset = *dataset, at = *at, step, wanted = *wanted, cancel = request.cancel] {
-        return probe_response(catalogue, *dataset, {at, step, wanted}, cancel);
-      });
+      [&catalogue, dataset = *dataset, asked = ProbeQuery{*at, *step, *wanted},
+       cancel = request.cancel] { return probe_response(catalogue, *dataset, asked, cancel); });
 }
 
 void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
@@ -326,10 +325,9 @@ void get_range(tasks::Backend& backend, const std::string& id, const std::string
                              "query parameter 'of' must be step or all, not " + printable(of, 40)));
   }
   if (of == "step") {
+    if (!step) return refuse(step.error());
     run_later(backend.loads, request, std::move(reply), "a range", subject->dataset.get(),
-              [subject = *subject, step = step.value_or(0)] {
-                return step_range(subject, static_cast<std::size_t>(step));
-              });
+              [subject = *subject, step = *step] { return step_range(subject, step); });
     return;
   }
   if (step)

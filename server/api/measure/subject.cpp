@@ -5,6 +5,7 @@
 #include "protocol/view.hpp"
 #include "server/api/measure/positions.hpp"
 #include "server/api/operations/parameters.hpp"
+#include "server/api/step_of_time.hpp"
 
 namespace windsplat::api {
 
@@ -43,8 +44,13 @@ Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::si
   return load_field(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
 }
 
-std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset) {
-  return read_integer(query, parameters::step, static_cast<int>(dataset.info().steps.size()) - 1);
+Result<std::size_t> read_step(http::QueryReader& query, const data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  const auto number =
+      read_integer(query, parameters::step, static_cast<int>(info.steps.size()) - 1);
+  const auto of_time = step_of(read_time(query), number.has_value(), info);
+  if (!of_time) return of_time.error();
+  return of_time->value_or(static_cast<std::size_t>(number.value_or(0)));
 }
 
 protocol::ProbedField probed_field(const data::FieldInfo& field) {

@@ -35,8 +35,9 @@ Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
                              http::QueryReader& query);
 
 Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::size_t step);
-// The parameter `step`, if it is a step of the dataset.
-std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset);
+// The step that a query asks for, by `step` or `datetime`; the first without both. Errors: those of
+// step_of(), which count after those of QueryReader::finish().
+Result<std::size_t> read_step(http::QueryReader& query, const data::Dataset& dataset);
 protocol::ProbedField probed_field(const data::FieldInfo& field);
 
 }  // namespace windsplat::api

@@ -23,7 +23,6 @@
 #include "server/api/measure/subject.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
-#include "server/api/step_of_time.hpp"
 #include "server/base/npy_head.hpp"
 #include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
@@ -40,7 +39,7 @@ constexpr double level_rounding = 1e-6;  // of single precision, relative
 constexpr double turn_degrees = 360;
 
 Error refuse_values(std::string_view parameter, const std::string& why) {
-  return make_error(ErrorKind::invalid, "query parameter '" + std::string(parameter) + "' " + why);
+  return make_error(ErrorKind::invalid, "query parameter '" + std::string(parameter) + '\'' + why);
 }
 
 std::optional<std::vector<double>> numbers_in(std::string_view text) {
@@ -62,9 +61,7 @@ struct ValuesQuery {
   std::optional<std::array<double, 4>> box;  // west, south, east, north
   std::vector<double> levels;                // none, one, or the ends of a range
   std::array<int, 3> stride{1, 1, 1};        // x, y, z
-  std::optional<std::string> time;
-  bool nearest = false;
-  int step = 0;
+  std::size_t step = 0;
 };
 
 Result<std::vector<double>> read_numbers(const std::optional<std::string>& text,
@@ -82,7 +79,7 @@ Result<std::array<int, 3>> strides_of(const std::vector<double>& given) {
   std::array<int, 3> out{1, 1, 1};
   for (std::size_t n = 0; n < given.size(); ++n) {
     if (!(given[n] >= 1 && given[n] <= stride_max) || given[n] != std::floor(given[n])) {
-      return refuse_values("stride", "must be integers from 1 to " + std::to_string(stride_max));
+      return refuse_values("stride", " must be integers from 1 to " + std::to_string(stride_max));
     }
     out.at(n) = static_cast<int>(given[n]);
   }
@@ -96,8 +93,6 @@ Result<ValuesQuery> read_asked(http::QueryReader& query, const data::Dataset& da
   const auto level_text = read_text(query, parameters::levels);
   const auto stride_text = read_text(query, parameters::stride);
   const auto step = read_step(query, dataset);
-  out.time = read_text(query, parameters::time);
-  const auto nearest = read_boolean(query, parameters::nearest);
   if (const auto ok = query.finish(); !ok) return ok.error();
   const auto box = read_numbers(box_text, "bbox", 4, 4, "four numbers west,south,east,north");
   if (!box) return box.error();
@@ -110,13 +105,8 @@ Result<ValuesQuery> read_asked(http::QueryReader& query, const data::Dataset& da
   const auto strides = strides_of(*stride);
   if (!strides) return strides.error();
   out.stride = *strides;
-  if (step && out.time) {
-    return make_error(ErrorKind::invalid,
-                      "query parameters 'step' and 'datetime' are mutually exclusive");
-  }
-  if (nearest && !out.time) return refuse_values("nearest", "requires 'datetime'");
-  out.nearest = nearest.value_or(false);
-  out.step = step.value_or(0);
+  if (!step) return step.error();
+  out.step = *step;
   return out;
 }
 
@@ -147,7 +137,7 @@ Result<std::array<int, 2>> levels_of(const ValuesQuery& asked, const data::Axis&
     }
   }
   if (count > 0) return std::array{first, count};
-  std::string text = "holds no level of axis '" + printable(axis.name, 60) + "'; next to it ";
+  std::string text = " holds no level of axis '" + printable(axis.name, 60) + "'; next to it ";
   if (below != nullptr) text += coordinate_text(*below);
   if (below != nullptr && above != nullptr) text += " and ";
   if (above != nullptr) text += coordinate_text(*above);
@@ -159,10 +149,10 @@ Result<scene::Crop> columns_of(const ValuesQuery& asked, const data::Grid& grid)
   protocol::RegionView region;
   if (asked.box) {
     const auto [west, south, east, north] = *asked.box;
-    if (south > north) return refuse_values("bbox", "has a south beyond its north");
+    if (south > north) return refuse_values("bbox", " has a south beyond its north");
     const bool round = grid.columns || grid.axes[0].kind == data::AxisKind::longitude;
     if (west > east && !round) {
-      return refuse_values("bbox", "has a west beyond its east, which only longitudes may have");
+      return refuse_values("bbox", " has a west beyond its east, which only longitudes may have");
     }
     (grid.columns ? region.longitudes : region.x) = protocol::Range{west, east};
     (grid.columns ? region.latitudes : region.y) = protocol::Range{south, north};
@@ -170,7 +160,7 @@ Result<scene::Crop> columns_of(const ValuesQuery& asked, const data::Grid& grid)
   auto crop = scene::crop_of(region, grid, 0);
   if (crop) return crop;
   const Error& error = crop.error();
-  return refuse_values("bbox", error.at.empty() ? error.message : error.at.front().detail);
+  return refuse_values("bbox", ": " + (error.at.empty() ? error.message : error.at.front().detail));
 }
 
 // What is read: a box of samples, every so many of which are taken.
@@ -216,13 +206,7 @@ Result<Selection> select_samples(const ValuesQuery& asked, const Subject& subjec
   }
   out.one_level = asked.levels.size() == 1 || info.grid.axes[2].coordinates.size() == 1;
   out.components = subject.field.components.size();
-  out.step = static_cast<std::size_t>(asked.step);
-  if (asked.time) {
-    const auto step =
-        step_of_time(info, *asked.time, asked.nearest ? Match::nearest : Match::exact);
-    if (!step) return step.error();
-    out.step = *step;
-  }
+  out.step = asked.step;
   if (const auto ok = check_size(out); !ok) return ok.error();
   return out;
 }

@@ -24,8 +24,8 @@ Operation probe_fields() {
           .description = "Of derived fields those in memory, and those in `fields`.",
           .query = {parameters::x, parameters::y, parameters::z, parameters::longitude,
                     parameters::latitude, parameters::level, parameters::height_field,
-                    parameters::index, parameters::step, parameters::fields, parameters::minus,
-                    parameters::minus_step},
+                    parameters::index, parameters::step, parameters::time, parameters::nearest,
+                    parameters::fields, parameters::minus, parameters::minus_step},
           .answers = {json_answer("The sample and its values.", "probe")},
           .problems = {404, 422, 507}};
 }
@@ -35,7 +35,8 @@ Operation count_values() {
           .group = values_group,
           .summary = "Histogram of a field",
           .query = {parameters::bins, parameters::range, parameters::clip, parameters::log,
-                    parameters::step, parameters::minus, parameters::minus_step},
+                    parameters::step, parameters::time, parameters::nearest, parameters::minus,
+                    parameters::minus_step},
           .answers = {json_answer("The counts.", "histogram")},
           .problems = {404, 422, 507}};
 }
@@ -77,7 +78,8 @@ Operation read_range() {
       .id = "readRange",
       .group = values_group,
       .summary = "Range of a field at a step, or at all steps",
-      .query = {parameters::range_of, parameters::step, parameters::minus, parameters::minus_step},
+      .query = {parameters::range_of, parameters::step, parameters::time, parameters::nearest,
+                parameters::minus, parameters::minus_step},
       .answers = {json_answer("The range; of a step with the samples of its ends.", "fieldRange")},
       .problems = {404, 413, 422, 507}};
 }

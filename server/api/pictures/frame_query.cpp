@@ -49,8 +49,7 @@ struct Changes {
   std::optional<std::string> step;
   std::optional<std::string> width;
   std::optional<std::string> height;
-  std::optional<std::string> time;
-  std::optional<bool> nearest;
+  TimeQuery time;
   std::optional<std::string> fields;
   std::optional<std::string> color_map;
   std::optional<std::string> annotate;
@@ -61,8 +60,7 @@ Changes read_changes(http::QueryReader& query) {
   out.step = query.integer(parameters::step.name);
   out.width = query.integer(parameters::width.name);
   out.height = query.integer(parameters::height.name);
-  out.time = read_text(query, parameters::time);
-  out.nearest = read_boolean(query, parameters::nearest);
+  out.time = read_time(query);
   out.fields = read_text(query, parameters::drawn_fields);
   out.color_map = read_text(query, parameters::color_map);
   out.annotate = read_text(query, parameters::annotate);
@@ -166,23 +164,6 @@ Result<void> annotate(protocol::View& view, const std::string& asked) {
   return {};
 }
 
-Result<void> choose_step(protocol::View& view, const Changes& changes,
-                         const data::DatasetInfo& info) {
-  if (!changes.time) {
-    if (!changes.nearest) return {};
-    return make_error(ErrorKind::invalid, "query parameter 'nearest' requires 'datetime'");
-  }
-  if (changes.step) {
-    return make_error(ErrorKind::invalid,
-                      "query parameters 'step' and 'datetime' are mutually exclusive");
-  }
-  const auto step = step_of_time(info, *changes.time,
-                                 changes.nearest.value_or(false) ? Match::nearest : Match::exact);
-  if (!step) return step.error();
-  view.step = static_cast<int>(*step);
-  return {};
-}
-
 // The view with all changes.
 Result<protocol::View> changed(const protocol::ViewDocument& base, const Changes& changes,
                                const data::DatasetInfo& info) {
@@ -190,7 +171,9 @@ Result<protocol::View> changed(const protocol::ViewDocument& base, const Changes
       base.patched(protocol::view_text(changes.step, changes.width, changes.height));
   if (!document) return document.error();
   protocol::View view = document->view();
-  if (const auto ok = choose_step(view, changes, info); !ok) return ok.error();
+  const auto step = step_of(changes.time, changes.step.has_value(), info);
+  if (!step) return step.error();
+  if (*step) view.step = static_cast<int>(**step);
   if (changes.fields) {
     if (const auto ok = draw_fields(view, info, *changes.fields); !ok) return ok.error();
   }
@@ -205,9 +188,14 @@ Result<protocol::View> changed(const protocol::ViewDocument& base, const Changes
 
 }  // namespace
 
-std::optional<double> read_dots_per_inch(http::QueryReader& query, frame::Format format) {
-  if (format == frame::Format::jpeg || format == frame::Format::npy) return std::nullopt;
-  return read_number(query, parameters::dpi);
+Result<std::optional<double>> read_dots_per_inch(http::QueryReader& query, frame::Format format) {
+  auto out = read_number(query, parameters::dpi);
+  if (out && (format == frame::Format::jpeg || format == frame::Format::npy)) {
+    return make_error(ErrorKind::invalid,
+                      "query parameter 'dpi' is of PNG, PDF and SVG; the picture asked for is "
+                      "JPEG or NPY: see Accept, or the end of the address");
+  }
+  return out;
 }
 
 Result<Picture> read_picture(const http::Request& request, frame::Format format,
@@ -224,8 +212,10 @@ Result<Picture> read_picture(const http::Request& request, frame::Format format,
     picture.encoding.quality =
         read_integer(query, parameters::quality).value_or(jpeg_quality_default);
   }
-  picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
+  const auto dots_per_inch = read_dots_per_inch(query, format);
   if (const auto ok = query.finish(); !ok) return ok.error();
+  if (!dots_per_inch) return dots_per_inch.error();
+  picture.encoding.dots_per_inch = *dots_per_inch;
   auto view = changed(base, changes, info);
   if (!view) return view.error();
   picture.view = std::move(*view);

@@ -40,7 +40,7 @@ struct Picture {
 Result<Picture> read_picture(const http::Request& request, frame::Format format,
                              const protocol::ViewDocument& base, const data::DatasetInfo& info);
 
-// The size on paper, of the formats that tell one: for others the parameter is unknown.
-std::optional<double> read_dots_per_inch(http::QueryReader& query, frame::Format format);
+// The size on paper. Errors: invalid (a format that tells none).
+Result<std::optional<double>> read_dots_per_inch(http::QueryReader& query, frame::Format format);
 
 }  // namespace windsplat::api

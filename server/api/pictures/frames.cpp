@@ -297,8 +297,10 @@ void check_and_submit(tasks::Backend& backend, access::Admission& admission, Pic
 Result<Picture> read_view(const http::Request& request, frame::Format format) {
   http::QueryReader query(request.query);
   Picture picture;
-  picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
+  const auto dots_per_inch = read_dots_per_inch(query, format);
   if (const auto ok = query.finish(); !ok) return ok.error();
+  if (!dots_per_inch) return dots_per_inch.error();
+  picture.encoding.dots_per_inch = *dots_per_inch;
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
   picture.view = document->view();

@@ -48,8 +48,8 @@ TEST_F(PrintSize, ValuesOutOfRangeAndOtherFormatsAreRefused) {
   EXPECT_EQ(post("?dpi=9", "application/pdf").status, 422);
   EXPECT_EQ(post("?dpi=2401", "image/svg+xml").status, 422);
   const Answer jpeg = post("?dpi=100", "image/jpeg");
-  EXPECT_EQ(jpeg.status, 400);
-  EXPECT_THAT(jpeg.body, HasSubstr("dpi"));
+  EXPECT_EQ(jpeg.status, 422);
+  EXPECT_THAT(jpeg.body, HasSubstr("'dpi' is of PNG, PDF and SVG"));
 }
 
 }  // namespace
