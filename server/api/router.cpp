@@ -163,14 +163,18 @@ bool names_stream(const http::Request& request) {
   return request.below_base && request.path == Segments{"v1", "stream"};
 }
 
-const char* Router::route(const http::Request& request, const http::Reply& reply) const {
+const char* Router::name_of(const http::Request& request) const {
+  const auto resource = find(request);
+  return resource ? resource->name : route_other;
+}
+
+void Router::route(const http::Request& request, const http::Reply& reply) const {
   const auto resource = find(request);
   if (draining_ && !names_health(request)) {
     reply(http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
   } else {
     answer(request, resource, reply);
   }
-  return resource ? resource->name : route_other;
 }
 
 StreamedBody Router::stream_body(const http::Request& request, std::uint64_t bytes) const {

@@ -27,13 +27,14 @@ class Router {
 
   // Whether the path is answered under any load: /livez, /readyz, /metrics.
   [[nodiscard]] bool names_health(const http::Request& request) const;
+  // The route name (routes.hpp), whether or not the request is refused.
+  [[nodiscard]] const char* name_of(const http::Request& request) const;
   // Calls `reply` once: now, or later from the renderer's thread. Does not throw after the reply.
-  // Returns the route name (routes.hpp).
-  const char* route(const http::Request& request, const http::Reply& reply) const;
+  void route(const http::Request& request, const http::Reply& reply) const;
   // Where the body of the request goes, of which only the header has been received; neither sink
   // nor refusal: it is read as a whole. A long body is refused here if the method is not allowed.
   [[nodiscard]] StreamedBody stream_body(const http::Request& request, std::uint64_t bytes) const;
-  // All values of route(), without repetition: a bounded set.
+  // All values of name_of(), without repetition: a bounded set.
   [[nodiscard]] std::vector<const char*> route_names() const;
 
  private:

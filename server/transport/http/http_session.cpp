@@ -77,6 +77,7 @@ class HttpSession final : public Connection, public HttpOwner {
       return refuse(std::move(*fault));
     }
     current_.charged = true;
+    current_.route = context_.router.name_of(request);
     const bool health = context_.router.names_health(request);
     if (auto refusal = context_.admission.request(visitor_, request, health)) {
       return refuse(std::move(*refusal));

@@ -25,8 +25,7 @@ void RequestWork::start(const HttpContext& context, CurrentRequest& current) {
   const http::Reply reply = [awaited](http::Response response) {
     awaited->answer(std::move(response));
   };
-  current.route =
-      context.router.route(current.request, packed_reply(context.packing, current.request, reply));
+  context.router.route(current.request, packed_reply(context.packing, current.request, reply));
 }
 
 bool RequestWork::finish() {

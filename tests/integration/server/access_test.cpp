@@ -59,6 +59,16 @@ TEST_F(Guarded, HealthNeedsNoToken) {
   EXPECT_EQ(get(port(), "/readyz").status, 200);
 }
 
+TEST_F(Guarded, WhatIsRefusedCountsByItsRoute) {
+  get(port(), "/v1/datasets");
+  get(port(), "/v1/datasets/small", {{"Authorization", "Bearer wrong"}});
+  get(port(), "/none");
+  const std::string metrics = get(port(), "/metrics", bearer).body;
+  for (const char* route : {"/v1/datasets", "/v1/datasets/{id}", "other"}) {
+    EXPECT_THAT(metrics, HasSubstr("route=\"" + std::string(route) + "\",status=\"4xx\"} 1\n"));
+  }
+}
+
 TEST_F(Guarded, EverythingElseNeedsAToken) {
   for (const char* target : {"/", "/v1", "/v1/datasets", "/metrics", "/view.schema.json", "/none",
                              "/v1/datasets/small/frame.jpg?width=20&height=20", "/login"}) {
