@@ -118,9 +118,8 @@ void patch_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const st
 void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                  const http::Request& request, http::Reply reply);
 
-// Where the body of a PUT of an upload goes, which also answers, or why it is refused; `disk`
-// writes it.
-StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
+// Where the body of a PUT of an upload goes, which also answers, or why it is refused.
+StreamedBody receive_upload(const ServerOptions& options, const UploadThreads& threads,
                             const std::string& id, const http::Request& request,
                             std::uint64_t bytes);
 http::Response get_upload(const ServerOptions& options, const std::string& id);

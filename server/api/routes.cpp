@@ -222,7 +222,7 @@ std::vector<Route> dataset_routes(const ServerOptions& options, tasks::Backend& 
   };
 }
 
-std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecutor& disk,
+std::vector<Route> upload_routes(const ServerOptions& options, const UploadThreads& threads,
                                  tasks::Catalogue& catalogue) {
   std::vector<Route> rows{
       Route{"GET", "/v1/uploads/{id}", operations::read_upload(), at_once(get_upload, options)},
@@ -231,12 +231,12 @@ std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecut
               request.sink->answer(request, reply);
             }},
   };
-  rows.back().open_sink = [&options, &disk](const PathValues& values, const http::Request& request,
-                                            std::uint64_t bytes) {
-    return receive_upload(options, disk, values[0], request, bytes);
+  rows.back().open_sink = [&options, threads](const PathValues& values,
+                                              const http::Request& request, std::uint64_t bytes) {
+    return receive_upload(options, threads, values[0], request, bytes);
   };
   rows.push_back(Route{"DELETE", "/v1/uploads/{id}", operations::remove_upload(),
-                       later(delete_upload, options, disk, catalogue)});
+                       later(delete_upload, options, threads.disk, catalogue)});
   return rows;
 }
 
@@ -245,14 +245,14 @@ std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecut
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, tasks::Backend& backend,
                           tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io,
-                          tasks::TaskExecutor& upload_io) {
+                          const UploadThreads& uploads) {
   const DocumentsPtr described = documents_of(options);
   std::vector<Route> table;
   for (auto part : {service_routes(options, draining, backend, described),
                     picture_routes(options.base_path, admission, backend, look_ups),
                     frame_routes(backend, admission, *options.views), view_routes(options, view_io),
                     dataset_routes(options, backend, look_ups),
-                    upload_routes(options, upload_io, backend.catalogue)}) {
+                    upload_routes(options, uploads, backend.catalogue)}) {
     std::move(part.begin(), part.end(), std::back_inserter(table));
   }
   described->describe(entries_of(table));

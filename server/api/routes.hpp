@@ -56,13 +56,20 @@ struct Route {
       nullptr;  // called once the header is received; empty: the body is read whole
 };
 
+// What works on uploads: `disk` writes parts of them and removes them, so that none waits for an
+// archive.
+struct UploadThreads {
+  tasks::TaskExecutor& disk;
+  tasks::TaskExecutor& unpacking;
+};
+
 // The table, with each handler bound to the parts of the server that it uses. In the order of
 // methods that Allow states. Documented in docs/user/api.md. `look_ups` resolve posted names,
-// `view_io` changes saved views, `upload_io` uploads.
+// `view_io` changes saved views.
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, tasks::Backend& backend,
                           tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io,
-                          tasks::TaskExecutor& upload_io);
+                          const UploadThreads& uploads);
 
 // Names by which requests are counted, besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";

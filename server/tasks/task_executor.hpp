@@ -72,9 +72,10 @@ inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, req
 inline constexpr TaskExecutor::Settings view_io_settings{"changes of saved views", 1, 64};
 // Compresses large answers.
 inline constexpr TaskExecutor::Settings packing_settings{"answers to compress", 1, 64};
-// Writes parts of uploads, and removes them. The spare threads are for archives that are unpacked,
-// and large ones that are removed.
-inline constexpr TaskExecutor::Settings upload_io_settings{"changes of uploads", 1, 64, 7};
+// Writes parts of uploads, and removes them. The spare threads are for large ones that are removed.
+inline constexpr TaskExecutor::Settings upload_io_settings{"changes of uploads", 1, 64, 3};
+// Unpacks archives that were uploaded: those of an address one after the other.
+inline constexpr TaskExecutor::Settings unpack_settings{"archives to unpack", 2, 64};
 // Checks files for changes and reopens them; the server submits one check at a time.
 inline constexpr TaskExecutor::Settings file_check_settings{"file checks", 1, 1};
 

@@ -27,7 +27,8 @@ ServerParts::ServerParts(api::ServerOptions server_options, std::shared_ptr<data
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this](const frame::Cost& cost) { return admission.check(cost); },
            options.ground_bytes}),
-      router(api::routes(options, draining, admission, backend, look_ups, view_io, upload_io),
+      router(api::routes(options, draining, admission, backend, look_ups, view_io,
+                         {upload_io, unpacking}),
              options, admission, draining) {
   metrics.count_routes(router.route_names());
 }
@@ -37,6 +38,7 @@ void ServerParts::end() {
   backend.end();
   file_checks.end();
   view_io.end();
+  unpacking.end();  // removes by upload_io
   upload_io.end();
   packing.end();  // after those that submit to it
 }

@@ -37,6 +37,7 @@ struct ServerParts {
   tasks::TaskExecutor look_ups{tasks::look_up_settings};
   tasks::TaskExecutor view_io{tasks::view_io_settings};
   tasks::TaskExecutor upload_io{tasks::upload_io_settings};
+  tasks::TaskExecutor unpacking{tasks::unpack_settings};
   tasks::TaskExecutor file_checks{tasks::file_check_settings};
   tasks::TaskExecutor packing{tasks::packing_settings};
   http::RequestIds request_ids;  // used by the io thread only

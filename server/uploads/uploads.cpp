@@ -104,6 +104,7 @@ struct Uploads::State {
     std::uint64_t bytes = 0;
     std::size_t at_a_time = 0;
     std::size_t kept = 0;  // complete, each with bytes
+    std::shared_ptr<const void> key = std::make_shared<char>();
   };
 
   // Unpacks the archive at a path beside it. Errors: those of loader::unpack(); out_of_memory
@@ -293,9 +294,10 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
     return state.no_room(address, "takes " + std::to_string(charge_of(bytes)));
   }
   state.receiving[id] = 0;
-  ++state.shares[address].at_a_time;
+  State::Share& share = state.shares[address];
+  ++share.at_a_time;
   const fs::path path = state.options.folder / incomplete / std::to_string(state.count++);
-  return std::shared_ptr<Incoming>(new Incoming(state_, announced, path));
+  return std::shared_ptr<Incoming>(new Incoming(state_, announced, path, share.key));
 }
 
 Result<Upload> Uploads::find(const std::string& id) const {
@@ -352,8 +354,14 @@ std::vector<std::string> Uploads::expire(std::time_t now) {
   return out;
 }
 
-Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, fs::path path)
-    : state_(std::move(state)), announced_(std::move(announced)), path_(std::move(path)) {}
+Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, fs::path path,
+                   std::shared_ptr<const void> address_key)
+    : state_(std::move(state)),
+      announced_(std::move(announced)),
+      path_(std::move(path)),
+      address_key_(std::move(address_key)) {}
+
+bool Incoming::is_archive() const { return uploads::is_archive(announced_.id); }
 
 Incoming::~Incoming() { discard(); }
 
@@ -363,7 +371,7 @@ void Incoming::discard() {
     ::close(file_);
     ::unlink(path_.c_str());
     std::error_code fault;
-    if (is_archive(announced_.id)) fs::remove_all(folder_beside(path_), fault);
+    if (is_archive()) fs::remove_all(folder_beside(path_), fault);
   }
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t taken = state_->receiving[announced_.id];
@@ -414,7 +422,7 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
                                               ", not the announced " +
                                               digest_text(*announced_.digest));
   }
-  const bool archive = is_archive(announced_.id);
+  const bool archive = is_archive();
   if (archive) {
     if (const auto ok = state_->unpack(announced_, path_, cancel); !ok) return ok.error();
   }

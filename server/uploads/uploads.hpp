@@ -96,6 +96,11 @@ class Incoming {
   Incoming(const Incoming&) = delete;
   Incoming& operator=(const Incoming&) = delete;
 
+  // Whether finish() unpacks it.
+  [[nodiscard]] bool is_archive() const;
+  // The same for all uploads that an address sends at a time.
+  [[nodiscard]] const std::shared_ptr<const void>& address_key() const { return address_key_; }
+
   // Errors: out_of_memory (quota, disk full), internal (disk).
   Result<void> write(std::span<const std::byte> bytes);
   // Makes it visible, or discards it. Errors: invalid (another digest than announced); cancelled;
@@ -104,7 +109,8 @@ class Incoming {
 
  private:
   friend class Uploads;
-  Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path);
+  Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path,
+           std::shared_ptr<const void> address_key);
 
   Result<void> open_file();
   Result<Upload> publish(const CancelToken& cancel);
@@ -113,6 +119,7 @@ class Incoming {
   const std::shared_ptr<Uploads::State> state_;
   const Announced announced_;
   const std::filesystem::path path_;
+  const std::shared_ptr<const void> address_key_;
   int file_ = -1;       // from the first byte on
   bool ended_ = false;  // finished or discarded
   std::uint64_t written_ = 0;

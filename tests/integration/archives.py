@@ -3,6 +3,7 @@
 
 Usage: archives.py --program=PATH [unittest arguments]
 """
+import contextlib
 import io
 import json
 import os
@@ -130,9 +131,9 @@ class Archives(WithUploads):
         self.assertIn(b" 201 ", answer)
         self.assertIn("2", seen)
 
-    def begun(self, name, body):
-        """A connection over which an upload was sent whole."""
-        client = socket.create_connection(self.daemon.host.split(":"))
+    def begun(self, name, body, client="127.0.0.1"):
+        """A connection over which an upload was sent whole, from an address of this machine."""
+        client = socket.create_connection(self.daemon.host.split(":"), source_address=(client, 0))
         client.sendall(f"PUT /v1/uploads/{name} HTTP/1.1\r\nHost: {self.daemon.host}\r\n"
                        f"Content-Length: {len(body)}\r\n\r\n".encode() + body)
         return client
@@ -146,6 +147,12 @@ class Archives(WithUploads):
             except OSError:  # a thread has ended
                 pass
         return found
+
+    @staticmethod
+    def cpu_limit(process):
+        """Seconds, or "unlimited"."""
+        limits = pathlib.Path(f"/proc/{process}/limits").read_text()
+        return limits.partition("Max cpu time")[2].split()[0]
 
     def stop_loaders(self, count):
         """Waits until so many unpack, and stops them."""
@@ -167,6 +174,29 @@ class Archives(WithUploads):
             self.daemon.end()
             self.assertLess(time.monotonic() - begun, 11)
         self.assertFalse((self.state / "uploads").exists())
+
+    def test_archives_delay_no_other_uploads_and_those_of_an_address_take_turns(self):
+        self.restart("1G")
+        body = zipped({f"{n}": b"x" for n in range(5_000)})
+        with contextlib.ExitStack() as clients:
+            sent = [clients.enter_context(self.begun(f"a{n}.zip", body)) for n in range(4)]
+            self.stop_loaders(1)
+            self.wait_until(lambda: self.cpu_limit(self.loaders()[0]) == "60")
+            sent.append(clients.enter_context(self.begun("b.zip", body, "127.0.0.2")))
+            self.stop_loaders(2)
+            with self.begun("plain.nc", b"x" * 100_000, "127.0.0.2") as other:
+                other.settimeout(60)
+                self.assertIn(b" 201 ", other.recv(400))
+            self.assertEqual(len(self.loaders()), 2)
+            for client in sent:
+                client.setblocking(False)
+                with self.assertRaises(BlockingIOError):
+                    client.recv(1)
+            for one in self.loaders():
+                os.kill(one, signal.SIGCONT)
+            for client in sent:
+                client.settimeout(60)
+                self.assertIn(b" 201 ", client.recv(400))
 
     def test_an_archive_whose_client_has_left_is_discarded(self):
         self.restart("1G")

@@ -14,6 +14,7 @@
 #include "server/http/body_sink.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
+#include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -37,14 +38,17 @@ http::Response upload_response(const uploads::Upload& upload) {
 // Works on a thread of the executor.
 class UploadSink final : public http::BodySink {
  public:
-  UploadSink(std::shared_ptr<Incoming> into, tasks::TaskExecutor& disk, const CancelToken& cancel,
-             std::string base_path)
-      : into_(std::move(into)), disk_(disk), cancel_(cancel), base_path_(std::move(base_path)) {}
+  UploadSink(std::shared_ptr<Incoming> into, const UploadThreads& threads,
+             const CancelToken& cancel, std::string base_path)
+      : into_(std::move(into)),
+        threads_(threads),
+        cancel_(cancel),
+        base_path_(std::move(base_path)) {}
   // The network thread, which closes connections, does not wait for a file that is removed: a task
   // has the last reference.
   ~UploadSink() override {
     try {
-      static_cast<void>(disk_.submit({{}, [into = std::move(into_)] {}, true}));
+      static_cast<void>(threads_.disk.submit({{}, [into = std::move(into_)] {}, true}));
     } catch (const std::bad_alloc&) {  // removed here
     }
   }
@@ -59,25 +63,35 @@ class UploadSink final : public http::BodySink {
       const auto written = into->write(*part);
       (*answer)(written ? std::nullopt : std::optional(http::problem_response(written.error())));
     };
-    const auto queued = disk_.submit({cancel_, run, true});
+    const auto queued = threads_.disk.submit({cancel_, run, true});
     if (!queued) (*answer)(http::problem_response(queued.error()));
   }
 
   void answer(const http::Request& request, http::Reply reply) override {
-    run_later(disk_, request, std::move(reply), "an upload", nullptr,
-              [into = into_, base_path = base_path_, cancel = request.cancel] {
-                const auto upload = into->finish(cancel);
-                if (!upload) return http::problem_response(upload.error());
-                http::Response response = upload_response(*upload);
-                response.status = 201;
-                response.headers.emplace_back("Location", base_path + "v1/uploads/" + upload->id);
-                return response;
-              });
+    const auto answer = std::make_shared<const http::Reply>(std::move(reply));
+    const auto finish = [into = into_, base_path = base_path_, cancel = cancel_] {
+      const auto upload = into->finish(cancel);
+      if (!upload) return http::problem_response(upload.error());
+      http::Response response = upload_response(*upload);
+      response.status = 201;
+      response.headers.emplace_back("Location", base_path + "v1/uploads/" + upload->id);
+      return response;
+    };
+    const auto run = [finish, answer, cancel = cancel_, id = request.id] {
+      auto response = tasks::run_guarded<http::Response>("an upload", cancel, finish, id);
+      (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
+    };
+    // Admitted, as take(): uploads are bounded, and so are those that wait for others of their
+    // address.
+    const bool unpacks = into_->is_archive();
+    const auto queued = (unpacks ? threads_.unpacking : threads_.disk)
+                            .submit({cancel_, run, true, unpacks ? into_->address_key() : nullptr});
+    if (!queued) (*answer)(http::problem_response(queued.error()));
   }
 
  private:
   std::shared_ptr<Incoming> into_;
-  tasks::TaskExecutor& disk_;
+  const UploadThreads threads_;
   const CancelToken cancel_;
   const std::string base_path_;
 };
@@ -106,7 +120,7 @@ Result<uploads::Announced> read_announced(const std::string& id, const http::Req
 
 }  // namespace
 
-StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
+StreamedBody receive_upload(const ServerOptions& options, const UploadThreads& threads,
                             const std::string& id, const http::Request& request,
                             std::uint64_t bytes) {
   if (!options.uploads) return {nullptr, uploads_are_off()};
@@ -118,8 +132,9 @@ StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& d
   if (!announced) return {nullptr, http::problem_response(announced.error())};
   auto into = options.uploads->begin(*announced);
   if (!into) return {nullptr, http::problem_response(into.error())};
-  return {std::make_shared<UploadSink>(std::move(*into), disk, request.cancel, options.base_path),
-          std::nullopt};
+  return {
+      std::make_shared<UploadSink>(std::move(*into), threads, request.cancel, options.base_path),
+      std::nullopt};
 }
 
 http::Response get_upload(const ServerOptions& options, const std::string& id) {

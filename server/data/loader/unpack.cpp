@@ -128,10 +128,16 @@ Result<Fate> hear(int socket, const Unpacking& what, Clock::time_point end, Mess
   }
 }
 
-// One message of the loader. The value: that was the last.
-Result<bool> take(const Message& heard, const Unpacking& what, Written& written,
-                  Clock::time_point& end) {
-  if (heard.kind == Kind::unpacked) return true;
+struct Taken {
+  bool is_end = false;
+  std::chrono::seconds more_time{0};  // for the loader
+};
+
+// One message of the loader.
+Result<Taken> take(const Message& heard, const Unpacking& what, Written& written) {
+  Taken out;
+  out.is_end = heard.kind == Kind::unpacked;
+  if (out.is_end) return out;
   if (heard.kind == Kind::failed) return decode_error(heard.payload);
   Result<void> done = loader_failed("violated the protocol");
   if (heard.kind == Kind::entries) {
@@ -140,7 +146,7 @@ Result<bool> take(const Message& heard, const Unpacking& what, Written& written,
     if (!in.complete()) return done.error();
     if (done = what.reserve(bytes); done) {
       written.allow(bytes);
-      end += std::chrono::seconds(bytes / bytes_per_second);
+      out.more_time = std::chrono::seconds(bytes / bytes_per_second);
     }
   } else if (heard.kind == Kind::entry) {
     done = written.begin(heard.payload);
@@ -148,7 +154,7 @@ Result<bool> take(const Message& heard, const Unpacking& what, Written& written,
     done = written.add(heard.payload);
   }
   if (!done) return done.error();
-  return false;
+  return out;
 }
 
 }  // namespace
@@ -160,6 +166,7 @@ Result<void> unpack(const Unpacking& what) {
   if (program.empty()) return make_error(ErrorKind::internal, "no loader executable is set");
   Process process;
   if (auto started = process.start(program); !started) return started;
+  process.allow_cpu(time_at_first);
   Written written(what.folder);
   auto end = Clock::now() + time_at_first;
   Fate fate = send_message(process.socket(), Kind::unpack, {}, archive.number(), end);
@@ -176,9 +183,13 @@ Result<void> unpack(const Unpacking& what) {
       return loader_failed("violated the protocol");
     }
     is_first = false;
-    const auto last = take(heard, what, written, end);
+    const auto begun = Clock::now();
+    const auto last = take(heard, what, written);
     if (!last) return last.error();
-    if (*last) return {};
+    if (last->is_end) return {};
+    // The loader has no part in the time that writing takes.
+    end += last->more_time + (Clock::now() - begun);
+    if (opens) process.allow_cpu(time_at_first + last->more_time);
   }
   if (fate == Fate::late) return loader_failed("took too long and was terminated");
   if (fate != Fate::closed) return loader_failed("violated the protocol and was terminated");
