@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "protocol/animation/limits.hpp"
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/problems/problem_types.hpp"
@@ -152,6 +153,10 @@ Json limits_json(const ServerLimits& server) {
                   {"jobsRunningMax", limits::jobs_running_max},
                   {"valuesBytesMax", limits::values_bytes_max},
                   {"valuesColumnsMax", limits::values_columns_max},
+                  {"animationFramesMax", limits::animation_frames_max},
+                  {"animationPixelsMax", limits::animation_pixels_max},
+                  {"animationBytesMax", limits::animation_bytes_max},
+                  {"videoPixelsMax", limits::video_pixels_max},
                   {"uploadBytesMax", server.upload_bytes_max},
                   {"uploadsBytesMax", server.uploads_bytes_max},
                   {"viewsMax", limits::views_max},

@@ -11,7 +11,7 @@
 
 namespace windsplat::protocol {
 
-inline constexpr int animation_frames_max = 1000000;
+inline constexpr int motion_frames_max = 1000000;
 inline constexpr int frames_per_step_max = 1000;
 inline constexpr double turn_max = 36000;            // degrees
 inline constexpr double animation_fps_min = 0.1;     // pictures a second

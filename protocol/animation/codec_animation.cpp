@@ -44,7 +44,7 @@ AnimationMotion read_motion(ObjectReader& reader) {
   if (const Json* steps = reader.child("steps")) {
     motion.steps = read_steps(*steps, reader.at("steps"), reader.faults());
   }
-  reader.integer("frames", motion.frames, {1, animation_frames_max});
+  reader.integer("frames", motion.frames, {1, motion_frames_max});
   reader.integer("perStep", motion.per_step, {1, frames_per_step_max});
   reader.number("fps", motion.fps, {animation_fps_min, animation_fps_max});
   reader.number("turn", motion.turn, {-turn_max, turn_max});

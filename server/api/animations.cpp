@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocol/animation/animation.hpp"
+#include "protocol/animation/limits.hpp"
 #include "server/api/resources.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
@@ -18,6 +19,7 @@ namespace windsplat::api {
 namespace {
 
 using tasks::Animations;
+namespace limits = protocol::limits;
 
 // An error of a view as that of the document that contains it.
 Error in_view(Error error) {
@@ -37,12 +39,14 @@ Result<void> check_length(const movie::Motion& motion, const protocol::View& vie
                           double picture_ms) {
   const double frames = motion.frames();
   const auto whole = [](double value) { return std::to_string(static_cast<std::int64_t>(value)); };
-  if (frames > Animations::frames_max) {
-    return too_many_frames(whole(Animations::frames_max) + " pictures", whole(frames));
+  if (frames > limits::animation_frames_max) {
+    return too_many_frames(std::to_string(limits::animation_frames_max) + " pictures",
+                           whole(frames));
   }
   const double pixels = frames * view.image.width * view.image.height;
-  if (pixels > Animations::pixels_max) {
-    return too_many_frames(whole(Animations::pixels_max) + " pixels in all", whole(pixels));
+  if (pixels > static_cast<double>(limits::animation_pixels_max)) {
+    return too_many_frames(std::to_string(limits::animation_pixels_max) + " pixels in all",
+                           whole(pixels));
   }
   const double seconds = frames * picture_ms / 1000;
   if (seconds <= Animations::render_s_max) return {};
@@ -69,7 +73,7 @@ Result<tasks::AnimationWork> read_work(tasks::Backend& backend, access::Admissio
   auto dataset = tasks::find_shown(backend.catalogue, view);
   if (!dataset) return in_view(dataset.error());
   auto motion = movie::Motion::of(std::move(asked->motion), view, (*dataset)->info(),
-                                  checked->steps, Animations::frames_max);
+                                  checked->steps, limits::animation_frames_max);
   if (!motion) return motion.error();
   const double picture_ms =
       backend.request_times.estimate_ms(view.dataset, view.method.name, checked->cost.kernels);

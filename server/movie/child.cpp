@@ -22,10 +22,12 @@
 namespace windsplat::movie {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr std::size_t errors_bytes_max = 4096;
 constexpr std::size_t all_bytes_max = std::size_t{1} << 20U;
-constexpr int patience_ms = 50;  // between looks at the cancel token
-constexpr int first_free = 16;   // above the numbers that the child gets
+constexpr int look_every_ms = 50;  // at the cancel token
+constexpr int first_free = 16;     // above the numbers that the child gets
 
 Error not_started(const std::string& program, int reason) {
   return make_error(ErrorKind::internal, in_quotes(program) + " cannot be started: " +
@@ -61,8 +63,9 @@ int start_with(const std::string& program, std::vector<std::string> words, const
 }  // namespace
 
 Result<Child> Child::start(const std::string& program, std::vector<std::string> arguments, int file,
-                           Keeps keeps) {
+                           Keeps keeps, std::chrono::milliseconds patience) {
   Child child;
+  child.patience_ = patience;
   child.messages_bytes_max_ = keeps == Keeps::all ? all_bytes_max : errors_bytes_max;
   child.name_ = program.substr(program.rfind('/') + 1);
   std::array<int, 2> pair{-1, -1};
@@ -97,7 +100,8 @@ Child::Child(Child&& other) noexcept
       input_(std::move(other.input_)),
       errors_(std::move(other.errors_)),
       messages_(std::move(other.messages_)),
-      messages_bytes_max_(other.messages_bytes_max_) {}
+      messages_bytes_max_(other.messages_bytes_max_),
+      patience_(other.patience_) {}
 
 Child::~Child() { kill_and_reap(); }
 
@@ -128,16 +132,19 @@ void Child::wait(bool to_write) {
   // A negative descriptor is ignored (poll(2)).
   std::array<pollfd, 2> events{
       {{errors_.number(), POLLIN, 0}, {to_write ? input_.number() : -1, POLLOUT, 0}}};
-  ::poll(events.data(), events.size(), patience_ms);
+  ::poll(events.data(), events.size(), look_every_ms);
   read_messages();
 }
 
 Result<void> Child::write(std::span<const std::uint8_t> bytes, const CancelToken& cancel) {
+  Clock::time_point since = Clock::now();
   while (!bytes.empty()) {
     if (cancel.cancelled()) return was_cancelled();
+    if (Clock::now() - since > patience_) return stalled("read nothing");
     const ssize_t sent = ::send(input_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      since = Clock::now();
     } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
       wait(true);
     } else if (errno != EINTR) {  // it reads no more: it has ended, or is about to
@@ -150,8 +157,10 @@ Result<void> Child::write(std::span<const std::uint8_t> bytes, const CancelToken
 
 Result<int> Child::status(const CancelToken& cancel) {
   input_.reset();
+  const Clock::time_point end = Clock::now() + patience_;
   while (errors_) {
     if (cancel.cancelled()) return was_cancelled();
+    if (Clock::now() > end) return stalled("did not end");
     wait(false);
   }
   while (true) {
@@ -162,8 +171,15 @@ Result<int> Child::status(const CancelToken& cancel) {
       return status;
     }
     if (cancel.cancelled()) return was_cancelled();
+    if (Clock::now() > end) return stalled("did not end");
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+}
+
+Error Child::stalled(const char* how) const {
+  return make_error(
+      ErrorKind::internal,
+      name_ + ' ' + how + " for " + std::to_string(patience_.count()) + " ms and was terminated");
 }
 
 Error Child::failed(int status) const {

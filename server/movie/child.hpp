@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -26,9 +27,12 @@ class Child {
 
   // Starts a program, an absolute path. It gets a stream as standard input, `file` (-1: none) as
   // descriptor 3, and no other descriptors, an environment of LC_ALL and LD_LIBRARY_PATH alone, and
-  // a process group of its own, so that Ctrl-C in a terminal does not reach it. Errors: internal.
+  // a process group of its own, so that Ctrl-C in a terminal does not reach it. A program that for
+  // `patience` reads nothing, or does not end, is terminated: write() or finish() fail. Errors:
+  // internal.
   static Result<Child> start(const std::string& program, std::vector<std::string> arguments,
-                             int file, Keeps keeps = Keeps::errors);
+                             int file, Keeps keeps = Keeps::errors,
+                             std::chrono::milliseconds patience = std::chrono::minutes(5));
 
   Child(Child&& other) noexcept;
   Child& operator=(Child&& other) = delete;
@@ -55,6 +59,7 @@ class Child {
   // Waits for its end. Errors: cancelled.
   Result<int> status(const CancelToken& cancel);
   [[nodiscard]] Error failed(int status) const;
+  [[nodiscard]] Error stalled(const char* how) const;
 
   std::string name_;  // of the program, without its folder
   pid_t id_ = -1;     // -1: reaped
@@ -62,6 +67,7 @@ class Child {
   data::Descriptor errors_;
   std::string messages_;
   std::size_t messages_bytes_max_ = 0;
+  std::chrono::milliseconds patience_{0};
 };
 
 }  // namespace windsplat::movie

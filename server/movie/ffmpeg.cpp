@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -13,6 +15,7 @@
 #include <system_error>
 #include <utility>
 
+#include "protocol/animation/limits.hpp"
 #include "server/base/cancel.hpp"
 #include "server/movie/child.hpp"
 
@@ -44,7 +47,7 @@ std::string found_in(std::string_view folders) {
 Result<std::vector<std::string>> ask_for_encoders(const std::string& program) {
   const CancelToken never;
   auto child = Child::start(program, {"-hide_banner", "-loglevel", "error", "-encoders"}, -1,
-                            Child::Keeps::all);
+                            Child::Keeps::all, std::chrono::seconds(10));
   if (!child) return child.error();
   if (auto done = child->finish(never); !done) return done.error();
   std::vector<std::string> out;
@@ -139,11 +142,12 @@ Result<void> check_encoder(Container container) {
 }
 
 Result<void> check_video_size(Container container, int width, int height) {
-  if (!needs_ffmpeg(container) || static_cast<double>(width) * height <= video_pixels_max)
-    return {};
-  return make_error(ErrorKind::too_large,
-                    "a picture of a video has at most 9437184 pixels (4096 x 2304): choose a "
-                    "smaller one, or zip as the format");
+  constexpr std::int64_t most = protocol::limits::video_pixels_max;
+  if (!needs_ffmpeg(container) || std::int64_t{width} * height <= most) return {};
+  return make_error(ErrorKind::too_large, "a picture of a video has at most " +
+                                              std::to_string(most) +
+                                              " pixels (4096 x 2304): choose a smaller one, or zip "
+                                              "as the format");
 }
 
 std::vector<std::string> arguments_of(const Options& options, const std::string& encoder, int width,

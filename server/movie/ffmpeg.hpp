@@ -32,10 +32,8 @@ Result<std::string> choose_encoder(const Ffmpeg& ffmpeg, Container container);
 // choose_encoder().
 Result<void> check_encoder(Container container);
 
-// Pixels of a picture of a video: an encoder holds many pictures in memory. 4096x2304.
-inline constexpr double video_pixels_max = 4096.0 * 2304;
-
-// Whether pictures of this size are encoded by a server; a ZIP may have any. Errors: too_large.
+// Whether pictures of this size are encoded by a server: an encoder holds many in memory, a ZIP
+// none. Errors: too_large, above limits::video_pixels_max.
 Result<void> check_video_size(Container container, int width, int height);
 
 // Arguments that read raw pictures (rgb24) from standard input, `width` x `height` pixels, both

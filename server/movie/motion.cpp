@@ -78,10 +78,10 @@ Result<void> Motion::choose_frames() {
   } else if (!asked_.per_step && asked_.turn && step_count() == 1) {
     count = frames_of_a_turn;
   }
-  if (count > protocol::animation_frames_max) {
+  if (count > protocol::motion_frames_max) {
     return make_error_at(
         ErrorKind::invalid, "/frames",
-        "an animation has at most " + std::to_string(protocol::animation_frames_max) + " pictures");
+        "an animation has at most " + std::to_string(protocol::motion_frames_max) + " pictures");
   }
   frames_ = static_cast<int>(count);
   return {};

@@ -34,7 +34,7 @@ class Motion {
   // looked at only if there are at most `frames_max` pictures, since that takes time for each.
   static Result<Motion> of(protocol::AnimationMotion asked, const protocol::View& view,
                            const data::DatasetInfo& info, int step_count,
-                           int frames_max = protocol::animation_frames_max);
+                           int frames_max = protocol::motion_frames_max);
 
   [[nodiscard]] int frames() const { return frames_; }
   [[nodiscard]] double fps() const { return fps_; }

@@ -394,9 +394,10 @@ TEST(Shapes, ServiceHealthColorMapsAndPresets) {
 }
 
 // Every constant of limits.hpp is published under its name in camel case with its value.
-TEST(Shapes, LimitsAreThoseOfTheLimitsFile) {
+TEST(Shapes, LimitsAreThoseOfTheLimitsFiles) {
   const Json limits = Json::parse(encode_service({}))["limits"];
-  std::istringstream source(read_protocol_file("limits.hpp"));
+  std::istringstream source(read_protocol_file("limits.hpp") +
+                            read_protocol_file("animation/limits.hpp"));
   std::size_t found = 0;
   for (std::string line; std::getline(source, line);) {
     const auto equals = line.find(" = ");

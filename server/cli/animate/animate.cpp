@@ -164,7 +164,7 @@ void add_animate(CLI::App& app, Action& chosen) {
           ->add_option("--frames", arguments->frames,
                        "Pictures in all, spread evenly over the steps; default: one for each step, "
                        "those of a --path in seconds, or 120 for a --turn of one step")
-          ->check(CLI::Range(1, protocol::animation_frames_max))
+          ->check(CLI::Range(1, protocol::motion_frames_max))
           ->type_name("N");
   command
       ->add_option("--per-step", arguments->per_step,

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "protocol/animation/limits.hpp"
 #include "protocol/codec.hpp"
 #include "protocol/utc_time.hpp"
 #include "server/data/model/digest.hpp"
@@ -68,9 +69,11 @@ Result<std::int64_t> size_of(const data::Descriptor& file) {
   if (::fstat(file.number(), &about) != 0) {
     return make_error(ErrorKind::internal, std::generic_category().message(errno));
   }
-  if (about.st_size <= Animations::bytes_max) return static_cast<std::int64_t>(about.st_size);
+  if (about.st_size <= protocol::limits::animation_bytes_max)
+    return static_cast<std::int64_t>(about.st_size);
   return make_error(ErrorKind::too_large,
-                    "an animation has at most " + std::to_string(Animations::bytes_max >> 20) +
+                    "an animation has at most " +
+                        std::to_string(protocol::limits::animation_bytes_max >> 20) +
                         " MiB; choose fewer or smaller pictures, or mp4 in place of zip");
 }
 

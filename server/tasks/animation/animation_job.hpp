@@ -27,8 +27,8 @@ struct AnimationWork {
 
 // Returns at once if it is kept already, otherwise blocks until it is finished. Cancellation takes
 // effect within about a tenth of a second, except while loading; no file remains. Errors:
-// cancelled; too_large above Animations::bytes_max; busy after Animations::render_s_max; those of
-// frame::complete(), prepare_picture() and movie::Writer.
+// cancelled; too_large above protocol::limits::animation_bytes_max; busy after
+// Animations::render_s_max; those of frame::complete(), prepare_picture() and movie::Writer.
 Result<protocol::JobResult> draw_animation(Backend& backend, const AnimationWork& work,
                                            const Jobs::Handle& handle);
 

@@ -40,10 +40,7 @@ class Animations {
  public:
   using Clock = std::chrono::steady_clock;
 
-  static constexpr int frames_max = 3600;
-  static constexpr double pixels_max = 4e9;     // of all pictures of one
   static constexpr double render_s_max = 3600;  // of all pictures of one: expected, and passed
-  static constexpr std::int64_t bytes_max = std::int64_t{256} << 20;     // of one
   static constexpr std::int64_t kept_bytes_max = std::int64_t{1} << 30;  // of all
   static constexpr std::size_t kept_max = 256;  // each is a mapping and a file
   static constexpr std::chrono::seconds lasts{3600};

@@ -179,6 +179,28 @@ TEST(MovieWriter, TheEndOfAMessageIsKept) {
   EXPECT_THAT(child->messages(), HasSubstr("No space left"));
 }
 
+TEST(MovieWriter, OneThatReadsNothingOrDoesNotEndIsTerminated) {
+  const MovieFolder folder;
+  put_ffmpeg(folder, "time.sleep(1000)");
+  constexpr std::chrono::milliseconds patience{300};
+  {
+    auto child = Child::start(folder.file("ffmpeg"), {}, -1, Child::Keeps::errors, patience);
+    ASSERT_TRUE(child) << child.error().message;
+    const std::vector<std::uint8_t> bytes(std::size_t{1} << 23U);  // more than a socket holds
+    const auto written = child->write(bytes, {});
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().message, "ffmpeg read nothing for 300 ms and was terminated");
+  }
+  {
+    auto child = Child::start(folder.file("ffmpeg"), {}, -1, Child::Keeps::errors, patience);
+    ASSERT_TRUE(child) << child.error().message;
+    const auto ended = child->finish({});
+    ASSERT_FALSE(ended);
+    EXPECT_EQ(ended.error().message, "ffmpeg did not end for 300 ms and was terminated");
+  }
+  expect_no_children();
+}
+
 TEST(MovieWriter, CancellationEndsAnFfmpegThatDoesNotRead) {
   const MovieFolder folder;
   put_ffmpeg(folder, "time.sleep(1000)");
