@@ -103,6 +103,7 @@ export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};
 const answers = ["animation", "animationRequest", "colorMaps", "fieldRange", "folder", "forecast"];
 answers.push("frameInfo", "histogram");
 answers.push("job", "jobs", "pick", "presets", "probe", "savedView", "series", "service");
+answers.push("upload", "values");
 
 async function generateAnswers() {
   const schema = JSON.parse(await readFile(join(protocol, "messages.schema.json"), "utf8"));

@@ -1,4 +1,6 @@
 // Data to and from a server: files that a client sends, and samples of fields as arrays.
+import type * as Answered from "../generated/answers";
+import type { Upload, ValuesAxis } from "../generated/answers";
 import { Api, type Job } from "../wire/api";
 import { bytesOf, nameOf, queryOf, settingsOf, type Bytes } from "../wire/arguments";
 import type { FetchLike } from "../wire/frame_request";
@@ -6,13 +8,7 @@ import { npyOf } from "../wire/npy";
 import { notUnderstood, posted, refusal } from "../wire/requests";
 import { isObject } from "../base/values";
 
-/** A file that the server has received; `upload` of messages.schema.json. */
-export interface Upload {
-  id: string;
-  bytes: number; // its size
-  digest: string; // as in Content-Digest (RFC 9530): "sha-256=:...:"
-  expires: string; // when it is removed, UTC
-}
+export type { Upload, ValuesAxis };
 
 export interface UploadOptions {
   keep?: number; // seconds after which the server removes it; by default 3600
@@ -20,29 +16,9 @@ export interface UploadOptions {
   signal?: AbortSignal;
 }
 
-/** The samples along an axis; `valuesAxis` of messages.schema.json. */
-export interface ValuesAxis {
-  name: string;
-  units: string;
-  index: number; // of the first sample in the axis of the dataset
-  stride: number; // samples of the dataset from one to the next
-  count: number;
-  turn?: number; // x only, across the seam of longitudes: samples around the globe
-  first: number; // coordinates of the first and the last sample
-  last: number;
-}
-
-/** Samples of a field; all but `values` is `values` of messages.schema.json. */
-export interface Values {
+/** Samples of a field; without the coordinates that only values.json has. */
+export interface Values extends Omit<Answered.Values, "longitudes" | "latitudes"> {
   values: Float32Array; // the last dimension is fastest; masked samples are NaN
-  dims: ("component" | "z" | "y" | "x")[];
-  shape: number[]; // lengths of the dimensions
-  axes: { x: ValuesAxis; y: ValuesAxis; z: ValuesAxis };
-  field: string;
-  step: number;
-  time: { value: number; text: string };
-  units: string; // of vectors that of the first component
-  componentUnits?: string[]; // if they differ
 }
 
 /** Which samples; without a key all along that axis, at the first step. */
