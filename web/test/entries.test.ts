@@ -15,7 +15,11 @@ const gcm = described("gcm", { choices: members("0") });
 const fifth = described("gcm,number=5", { choices: members("5") });
 const storm = described("storm");
 
-const done = (result: string): OpeningJob => ({ id: "7", state: "done", result, problem: null });
+const running: OpeningJob = {
+  ...{ id: "7", kind: "dataset", state: "running", progress: 0.5, etaMs: null },
+  ...{ result: null, problem: null },
+};
+const done = (result: string): OpeningJob => ({ ...running, state: "done", result });
 
 // Answers later requests of the newest page by their method and path. Returns them, with bodies.
 function serve(answers: Record<string, unknown>, status = 200): string[] {
@@ -233,7 +237,6 @@ test("the newest choice wins, and a cancelled one has no effect", async () => {
 });
 
 test("a running job is asked again, and cancelled once it is not wanted", async () => {
-  const running: OpeningJob = { id: "7", state: "running", result: null, problem: null };
   const slept: number[] = [];
   const cancelled: string[] = [];
   let polls = 0;

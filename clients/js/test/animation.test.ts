@@ -47,6 +47,16 @@ test("a movie is the file of the job's result", async () => {
   ]);
 });
 
+test("the result of opening a dataset is its id", async () => {
+  const opening = { kind: "dataset" };
+  const answers = [jobOf("queued", opening), jobOf("done", { ...opening, result: "winds" })];
+  for (const open of ["openPath", "openUpload"] as const) {
+    const { client } = serverOf([...answers]);
+    const id: string | null = await client.finished(await client[open]("a.nc"), { wait: soon });
+    assert.equal(id, "winds");
+  }
+});
+
 test("a job that failed is its problem", async () => {
   const { client } = serverOf([jobOf("failed", { problem })]);
   const job = await client.createAnimation(request);

@@ -128,14 +128,14 @@ export class Client extends DataApi {
   }
 
   /** Follows a job until it is over: its result. A job that failed is a ProblemError. */
-  async finished(started: Job, options: FollowOptions = {}): Promise<Job["result"]> {
+  async finished<J extends Job>(started: J, options: FollowOptions = {}): Promise<J["result"]> {
     const { progress, signal = new AbortController().signal, wait = waitFor } = options;
     let job = started;
     try {
       for (let ms = pollFirstMs; isOpen(job); ms *= 1.5) {
         progress?.(job);
         await wait(Math.min(ms, pollMostMs), signal);
-        job = await this.get<Job>(`v1/jobs/${encodeURIComponent(job.id)}`, isJob, { signal });
+        job = await this.get<J>(`v1/jobs/${encodeURIComponent(job.id)}`, isJob, { signal });
       }
     } catch (failure) {
       if (signal.aborted) await this.cancelJob(job.id).catch(() => {}); // it may have finished

@@ -1,7 +1,7 @@
 // Data to and from a server: files that a client sends, and samples of fields as arrays.
 import type * as Answered from "../generated/answers";
 import type { Upload, ValuesAxis } from "../generated/answers";
-import { Api, type Job } from "../wire/api";
+import { Api, type OpeningJob } from "../wire/api";
 import { bytesOf, nameOf, queryOf, settingsOf, type Bytes } from "../wire/arguments";
 import type { FetchLike } from "../wire/frame_request";
 import { npyOf } from "../wire/npy";
@@ -70,8 +70,8 @@ export class DataApi extends Api {
   }
 
   /** Opens an upload; the result of the job is the id of the dataset. */
-  async openUpload(id: string): Promise<Job> {
-    return this.get<Job>("v1/datasets", isJob, posted({ upload: nameOf("id", id) }));
+  async openUpload(id: string): Promise<OpeningJob> {
+    return this.get<OpeningJob>("v1/datasets", isJob, posted({ upload: nameOf("id", id) }));
   }
 
   /** Removes an upload and the datasets opened from it. */

@@ -45,7 +45,7 @@ export type Histogram = Answered.Histogram;
 export type Feature = NonNullable<PickedFeature>;
 
 /** The opening of a dataset, as a job of the server; its result is the id of the dataset. */
-export type OpeningJob = Pick<Job, "id" | "state" | "problem"> & { result: string | null };
+export type OpeningJob = Job & { result: string | null };
 
 /** What is subtracted from the fields; null or undefined: nothing. */
 export type Difference = View["difference"];
