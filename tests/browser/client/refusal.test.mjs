@@ -65,19 +65,38 @@ test("a server that is down gives no answer, to the client and the element", asy
   assert.deepEqual(await failures(page, down), twice(true, false, text));
 });
 
-test("a proxy whose server is down may be why the page is refused", async (t) => {
-  const proxy = createServer((_, response) => response.writeHead(502).end("Bad Gateway"));
+// The address of a proxy that gives one answer after a time, by default that of one without its
+// server.
+async function proxyWith(t, { afterMs = 0, status = 502, headers = {} } = {}) {
+  const answer = (_, response) =>
+    setTimeout(() => response.writeHead(status, headers).end(), afterMs);
+  const proxy = createServer(answer);
   await new Promise((listens) => proxy.listen(0, "127.0.0.1", listens));
   t.after(() => {
     proxy.close();
     proxy.closeAllConnections();
   });
-  const url = `http://127.0.0.1:${proxy.address().port}`;
+  return `http://127.0.0.1:${proxy.address().port}`;
+}
+
+test("a proxy whose server is down may be why the page is refused", async (t) => {
+  const url = await proxyWith(t);
   const page = await closed.pageWith(t, viewOf(url));
   const shown = await shownBy(page);
   assert.equal(shown, refusal(url, closed));
   assert.match(shown, /a proxy answers in its place/);
   assert.deepEqual(await failures(page, url), twice(true, true, refusal(`${url}/`, closed)));
+});
+
+test("on a slow link the element tells what the answer is, not that there is none", async (t) => {
+  const afterMs = 2200; // longer than the time between attempts
+  const url = await proxyWith(t, { afterMs });
+  const page = await closed.pageWith(t, viewOf(url));
+  assert.equal(await shownBy(page), refusal(url, closed));
+  const headers = { "Access-Control-Allow-Origin": "*" };
+  const asking = await proxyWith(t, { afterMs, status: 401, headers });
+  const { detail } = await event(await closed.pageWith(t, viewOf(asking)), "error");
+  assert.deepEqual([detail.kind, /asks for a token/.test(detail.message)], ["login", true]);
 });
 
 test("a server with a token tells pages that it does not allow the same", async (t) => {

@@ -356,17 +356,15 @@ export class WindsplatView extends Base {
     this.loading.end();
     if (state.name === "asleep") this.say(`paused: ${state.reason}`);
     if (state.name === "connecting" && !this.told) this.say("connecting …");
-    if (state.name === "locked") {
-      this.outage("login", this.secret === undefined ? needsToken : wrongToken);
-    }
-    // The first time what the server answers is awaited.
-    if (state.name === "waiting" && state.attempt > 1) this.lost("silent", state.reason);
   }
 
+  // An outage is told once it is known what the server answers otherwise, while the stream may be
+  // on its next attempt.
   private lost(reach: Reach, reason: string): void {
-    if (reach === "login") return; // the next state tells
     const { origin } = new URL(this.src);
-    if (reach === "foreign") this.outage("connection", refusesPages(origin));
+    const login = this.secret === undefined ? needsToken : wrongToken;
+    if (reach === "login") this.outage("login", login);
+    else if (reach === "foreign") this.outage("connection", refusesPages(origin));
     else if (reach === "answers" || origin === ownOrigin()) this.outage("connection", reason);
     else this.outage("connection", `no answer from ${origin}`);
   }
