@@ -7,13 +7,14 @@ import contextlib
 import dataclasses
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
 import tempfile
 import zipfile
 import zlib
-from typing import Any, Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Callable, Iterable, Iterator, Mapping, Sequence, Union
 
 from .errors import MovieFailed, WindsplatError
 from .view import View
@@ -30,7 +31,11 @@ KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".apng": "image/png"}
 SUFFIXES = (*CODECS, ".apng", ".zip")
 PNG_START = b"\x89PNG\r\n\x1a\n"
 OF_SERVER = (".mp4", ".webm", ".zip")  # what its jobs write
+FPS = 24  # as that of the server's animations
+RANGE = ("first", "last", "stride")
 INLINE_BYTES_MAX = 20_000_000  # of a movie in the text of a notebook
+
+Steps = Union[Iterable[int], Mapping[str, int], str]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,6 +181,22 @@ def _part_of(path: pathlib.Path) -> Iterator[pathlib.Path]:
         part.unlink(missing_ok=True)
 
 
+def steps_of(steps: Steps | None, count: int) -> Sequence[int]:
+    """The steps that View.movie is asked for, of the `count` of a dataset. Raises ValueError."""
+    asked = {} if steps is None else steps
+    if isinstance(asked, str) and re.fullmatch(r"\d+:\d+(:\d+)?", asked, re.ASCII):
+        asked = dict(zip(RANGE, map(int, asked.split(":"))))
+    if isinstance(asked, Mapping) and asked.keys() <= set(RANGE):
+        first, last, stride = (asked.get(key, value)
+                               for key, value in zip(RANGE, (0, count - 1, 1)))
+        if 0 <= first <= last < count and stride >= 1:
+            return range(first, last + 1, stride)
+    if isinstance(asked, (str, Mapping)):
+        raise ValueError(f"steps={steps!r} are none of 0 to {count - 1}: give numbers, "
+                         "'FIRST:LAST[:STRIDE]', or the keys first, last and stride")
+    return [int(step) for step in asked]
+
+
 def step_range(steps: Iterable[int]) -> dict[str, int] | None:
     """Steps as the server's animations state them. None: they are at no equal distances."""
     every = [int(step) for step in steps]
@@ -212,7 +233,7 @@ def animation(
 
 
 def movie(
-    path: str | os.PathLike[str], views: Iterable[View], fps: float = 12, *, workers: int = 2,
+    path: str | os.PathLike[str], views: Iterable[View], fps: float = FPS, *, workers: int = 2,
     progress: Callable[[int, int], object] | None = None,
 ) -> Movie:
     """Writes the pictures of views, in order, as a movie.
@@ -220,6 +241,7 @@ def movie(
     path: .mp4 or .webm need the program ffmpeg; .apng (an animated PNG, which browsers and
         Jupyter show) and .zip (PNG files) need nothing.
     views: all of one size, for example view.turn(36).
+    fps: pictures a second, 0.1 to 120.
     workers: requests at a time, 1 to 16.
     progress: called with the number of frames done and of all.
 

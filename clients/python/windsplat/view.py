@@ -9,7 +9,7 @@ import math
 import os
 import pathlib
 import urllib.parse
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Literal, Mapping, Sequence, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Literal, Mapping, Sequence, TypeVar
 
 from . import _camera
 from ._documents import at_pointer, check, merged, own_schema, plain
@@ -20,7 +20,7 @@ from .generated.view_types import UNSET, ViewDocument, ViewParts
 if TYPE_CHECKING:
     from .dataset import Dataset
     from .jupyter import IFrame
-    from .movie import Movie
+    from .movie import Movie, Steps
 
 SelfView = TypeVar("SelfView", bound="View")
 
@@ -273,15 +273,20 @@ class View(ViewParts):
         return f"{page}#!view={saved['id']}"
 
     def movie(
-        self, path: str | os.PathLike[str], steps: Iterable[int] | None = None, fps: float = 12,
-        *, turn: float | None = None, camera_path: Mapping[str, Any] | None = None,
+        self, path: str | os.PathLike[str], steps: Steps | None = None,
+        fps: float | None = None, *, turn: float | None = None,
+        camera_path: Mapping[str, Any] | None = None,
         frames: int | None = None, per_step: int | None = None, workers: int | None = None,
         timeout: float = 3600, progress: Callable[[int, int], object] | None = None,
     ) -> Movie:
-        """A movie of the steps of the dataset, by default of all of them.
+        """A movie of steps of the dataset.
 
         path: .mp4, .webm and .zip (PNG files) are drawn by a job of the server, which needs the
             program ffmpeg for the first two; .apng is made here.
+        steps: numbers; "FIRST:LAST" or "FIRST:LAST:STRIDE", the last one included, as `windsplat
+            animate --steps` takes them; or the keys first, last and stride of POST /v1/animations.
+            By default all.
+        fps: pictures a second, by default 24.
         turn: degrees by which the camera turns about the vertical axis, eastward.
         camera_path: keyframes of the camera (POST /v1/animations) in place of a turn.
         frames, per_step: of the movie in all, or for each step.
@@ -292,10 +297,10 @@ class View(ViewParts):
 
         Raises the Problem that the server reports, JobTimeout, and what windsplat.movie raises.
         """
-        from .movie import OF_SERVER, animation, movie, step_range
+        from .movie import FPS, OF_SERVER, animation, movie, step_range, steps_of
 
         out = pathlib.Path(path)
-        chosen = list(range(len(self.dataset.steps)) if steps is None else steps)
+        chosen = steps_of(steps, len(self.dataset.steps))
         shown = step_range(chosen)
         moves = {"turn": turn, "path": camera_path, "frames": frames, "perStep": per_step}
         if workers is None and shown is not None and out.suffix.lower() in OF_SERVER:
@@ -303,8 +308,8 @@ class View(ViewParts):
         if any(value is not None for value in moves.values()):
             raise ValueError("turn, camera_path, frames and per_step are for movies of the server: "
                              f"{', '.join(OF_SERVER)} of steps at equal distances, without workers")
-        return movie(out, [self.at(int(step)) for step in chosen], fps, workers=workers or 2,
-                     progress=progress)
+        return movie(out, [self.at(step) for step in chosen], FPS if fps is None else fps,
+                     workers=workers or 2, progress=progress)
 
     # --- Jupyter and the page ------------------------------------------------------------------
 

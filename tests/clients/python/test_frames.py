@@ -249,7 +249,7 @@ class Movies(unittest.TestCase):
     def test_a_zip_has_all_steps_in_order_whoever_makes_it(self):
         for workers in (None, 3):
             movie = self.view.movie(self.folder / "a.zip", workers=workers)
-            self.assertEqual((movie.frames, movie.fps, movie.width, movie.height), (8, 12, 63, 40))
+            self.assertEqual((movie.frames, movie.fps, movie.width, movie.height), (8, 24, 63, 40))
             with zipfile.ZipFile(self.folder / "a.zip") as file:
                 names = file.namelist()
                 self.assertEqual(names, [f"frame_{k:06d}.png" for k in range(8)])
@@ -272,7 +272,26 @@ class Movies(unittest.TestCase):
             self.assertNotEqual(file.read("frame_000001.png"), view.frame().bytes)
         key = {"projection": "perspective", "target": [0, 0, 0]}
         keys = [{"time": at, "camera": {**key, "eye": [2, -2, 1 + at]}} for at in (0, 1)]
-        self.assertEqual(view.movie(path, steps=[0], camera_path={"keyframes": keys}).frames, 13)
+        self.assertEqual(view.movie(path, steps=[0], camera_path={"keyframes": keys}).frames, 25)
+
+    def test_steps_are_given_as_the_command_line_and_the_rest_interface_take_them(self):
+        path = self.folder / "a.zip"
+        for steps, shown in (("1:7:3", (1, 4, 7)), ("2:3", (2, 3)), ({"first": 6}, (6, 7)),
+                             ({"last": 5, "stride": 4}, (0, 4)), ([5, 3], (5, 3))):
+            for workers in (None, 2):
+                with self.subTest(steps=steps, workers=workers):
+                    made = self.view.movie(path, steps=steps, workers=workers)
+                    self.assertEqual(made.frames, len(shown))
+                    with zipfile.ZipFile(path) as file:
+                        for name, step in zip(file.namelist(), shown):
+                            self.assertEqual(file.read(name), self.view.at(step).frame().bytes)
+
+    def test_steps_that_are_none_of_the_dataset_are_refused_with_those_that_are(self):
+        for steps in ("", "3", "0-3", "0:3:", "-1:3", "3:0", "0:8", "0:3:0", {"first": 8},
+                      {"last": 8}, {"from": 1}, {"stride": -1}):
+            with self.subTest(steps), self.assertRaisesRegex(ValueError, "none of 0 to 7: give"):
+                self.view.movie(self.folder / "a.zip", steps=steps)
+        self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_a_job_that_takes_too_long_is_ended(self):
         view = self.view.size(800, 600)
