@@ -8,8 +8,8 @@ function(windsplat_python_test name)
 endfunction()
 
 if(NOT WINDSPLAT_SANITIZE)
-  windsplat_python_test(api test_documents test_start test_server test_times test_frames
-    test_widget)
+  windsplat_python_test(api test_documents test_start test_server test_uploads test_times
+    test_frames test_widget)
   windsplat_python_test(xarray test_xarray)
   windsplat_python_test(notebooks test_notebooks)
   windsplat_python_test(package test_docs test_wheel)

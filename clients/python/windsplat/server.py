@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Sequence
 from ._documents import suggestion
 from ._http import Http
 from ._process import Process, find_program, is_below
+from ._zarr import packed
 from .dataset import Dataset
 from .errors import (
     ConnectionFailed,
@@ -189,11 +190,28 @@ class Server:
         --upload-limit and --state-dir. It is removed after `keep` seconds, or by
         dataset.close(forget=True).
 
+        path: a file, or the folder of a Zarr store, which is packed before, as a temporary file of
+            the same size (folder: TMPDIR).
         progress: called as progress(bytes sent, all bytes), from 0.
 
-        Raises Unauthorized if the server takes no uploads, and what open() raises.
+        Raises Unauthorized if the server takes no uploads, ValueError for another folder, and what
+        open() raises.
         """
         whole = pathlib.Path(path)
+        with packed(whole) if whole.is_dir() else contextlib.nullcontext(whole) as file:
+            name = self._send(file, keep, progress)
+        try:
+            dataset = self._opened({"upload": name}, timeout)
+        except BaseException:
+            with contextlib.suppress(WindsplatError):
+                self.http.request("DELETE", f"v1/uploads/{name}")
+            raise
+        dataset.upload_id = name
+        return dataset
+
+    def _send(self, whole: pathlib.Path, keep: float,
+              progress: Callable[[int, int], object] | None) -> str:
+        """Uploads a file. Returns its name at the server."""
         digest = hashlib.sha256()
         with whole.open("rb") as file:
             while block := file.read(1 << 20):
@@ -205,14 +223,7 @@ class Server:
         value = base64.b64encode(digest.digest()).decode()
         self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
                           progress=progress, headers={"Content-Digest": f"sha-256=:{value}:"})
-        try:
-            dataset = self._opened({"upload": name}, timeout)
-        except BaseException:
-            with contextlib.suppress(WindsplatError):
-                self.http.request("DELETE", f"v1/uploads/{name}")
-            raise
-        dataset.upload_id = name
-        return dataset
+        return name
 
     def entry(self, dataset: Dataset, timeout: float = 300, **selection: Any) -> Dataset:
         """Another entry of a dataset with choices: server.entry(ds, number=3)."""

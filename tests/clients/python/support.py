@@ -42,6 +42,10 @@ def shared_server():
     return tuple(_shared)
 
 
+def problem(status, **more):
+    return {"type": "about:blank", "title": "Refused", "status": status, "detail": "no", **more}
+
+
 class Prepared:
     """A server that gives prepared answers (status, headers, document) and then repeats the last
     one; `requests` are the methods and targets that it got, `bodies` and `headers` what came with

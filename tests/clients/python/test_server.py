@@ -1,14 +1,10 @@
 """Servers, datasets and values, against the real daemon; refusals against prepared answers."""
 import asyncio
-import base64
 import concurrent.futures
 import datetime
 import email.utils
-import hashlib
-import json
 import multiprocessing
 import os
-import pathlib
 import subprocess
 import tempfile
 import threading
@@ -17,13 +13,9 @@ import unittest
 import unittest.mock
 
 import numpy as np
-from support import Prepared, shared_server, start, windsplat
+from support import Prepared, problem, shared_server, start, windsplat
 
 from windsplat._times import SAME, step_of
-
-
-def problem(status, **more):
-    return {"type": "about:blank", "title": "Refused", "status": status, "detail": "no", **more}
 
 
 class Refusals(unittest.TestCase):
@@ -268,46 +260,6 @@ class Open(unittest.TestCase):
         dataset = self.server.open("part_1.nc")
         dataset.close(forget=True)
         self.assertNotIn("part_1", self.server.datasets)
-
-
-class Uploads(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name) / "my winds.nc"
-        self.path.write_bytes(b"0123456789" * 1000)
-
-    def test_a_file_is_sent_with_its_digest_and_opened(self):
-        done = {"id": "1", "kind": "dataset", "state": "done", "result": "winds", "problem": None}
-        refused = (429, {"Retry-After": "0"}, problem(429))
-        with Prepared(refused, (201, {}, {}), (202, {}, done)) as there:
-            sent = []
-            dataset = windsplat.Server(there.url).upload(
-                self.path, keep=60, progress=lambda *counts: sent.append(counts))
-            self.assertEqual(dataset.id, "winds")
-            again, put, post = there.requests
-            self.assertEqual(again, put)
-            self.assertRegex(put, r"^PUT /v1/uploads/my-winds-[0-9a-f]{16}\.nc\?keep=60$")
-            self.assertEqual(post, "POST /v1/datasets")
-            self.assertEqual(there.bodies[1], self.path.read_bytes())
-            digest = base64.b64encode(hashlib.sha256(there.bodies[1]).digest()).decode()
-            self.assertEqual(there.headers[1]["Content-Digest"], f"sha-256=:{digest}:")
-            self.assertEqual((sent[0], sent[-1]), ((0, 10_000), (10_000, 10_000)))
-            self.assertEqual(json.loads(there.bodies[2]),
-                             {"upload": put.split("/")[3].split("?")[0]})
-            dataset.close(forget=True)
-            self.assertEqual(there.requests[-1], put.replace("PUT", "DELETE").split("?")[0])
-
-    def test_a_server_that_takes_no_uploads_says_so_of_a_long_file_too(self):
-        self.path.write_bytes(bytes(100_000))  # more than other bodies may have
-        with self.assertRaisesRegex(windsplat.Unauthorized, "--upload-limit and --state-dir"):
-            shared_server()[0].upload(self.path)
-
-    def test_an_upload_that_cannot_be_opened_is_removed(self):
-        with Prepared((201, {}, {}), (422, {}, problem(422)), (204, {}, {})) as there:
-            with self.assertRaises(windsplat.InvalidView):
-                windsplat.Server(there.url).upload(self.path)
-            self.assertEqual([one.split()[0] for one in there.requests], ["PUT", "POST", "DELETE"])
 
 
 class Secured(unittest.TestCase):
