@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <future>
 #include <thread>
 #include <vector>
@@ -54,6 +56,39 @@ TEST(BackgroundWork, LeavesOthersThreeQuartersOfTheTime) {
   ASSERT_TRUE(work.draw(owner));
   EXPECT_FALSE(work.cut.back());
   EXPECT_GE(work.begun - first_end, 3 * milliseconds(20));
+}
+
+// Two clients: one frame is drawn while another waits.
+TEST(BackgroundWork, IsDrawnThoughAnotherJobAlwaysWaits) {
+  RenderService renderer{RenderService::Options{}};
+  std::atomic<bool> is_over{false};
+  std::vector<std::thread> clients;
+  for (std::uint64_t client = 1; client <= 2; ++client) {
+    clients.emplace_back([&, client] {
+      while (!is_over) {
+        std::promise<void> drawn;
+        RenderJob frame;
+        frame.kind = RenderKind::stream;
+        frame.owner = client;
+        frame.run = [&drawn](std::int64_t /*queue_us*/) {
+          std::this_thread::sleep_for(milliseconds(20));
+          drawn.set_value();
+        };
+        EXPECT_TRUE(renderer.submit(std::move(frame)));
+        drawn.get_future().wait();
+      }
+    });
+  }
+  std::this_thread::sleep_for(milliseconds(50));
+  BackgroundOwner owner{7, "a"};
+  owner.until = Clock::now() + std::chrono::minutes(2);
+  for (int piece = 0; piece < 3; ++piece) {
+    const auto done =
+        in_background(renderer, owner, {}, [](const CancelToken&) { return Result<void>(); });
+    EXPECT_TRUE(done) << done.error().message;
+  }
+  is_over = true;
+  for (std::thread& client : clients) client.join();
 }
 
 TEST(BackgroundWork, EndsWhenItsTimeIsOver) {
