@@ -192,8 +192,11 @@ Error Child::failed(int status) const {
   if (said.size() > said_bytes_max) said.erase(0, said.size() - said_bytes_max);
   std::replace(said.begin(), said.end(), '\n', ' ');
   if (!said.empty()) text += ": " + printable(said, 1000);
-  const bool full =
-      said.find("No space left on device") != std::string::npos;  // ENOSPC in LC_ALL=C
+  // ENOSPC, EDQUOT and EFBIG in LC_ALL=C.
+  constexpr std::array faults{"No space left on device", "Disk quota exceeded", "File too large"};
+  const bool full = std::any_of(faults.begin(), faults.end(), [&](const char* fault) {
+    return said.find(fault) != std::string::npos;
+  });
   return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(text));
 }
 

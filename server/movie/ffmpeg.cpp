@@ -155,7 +155,8 @@ std::vector<std::string> arguments_of(const Options& options, const std::string&
   const std::string size = std::to_string(width) + 'x' + std::to_string(height);
   const std::string fps = fps_text(options.fps);
   std::vector<std::string> words;
-  append(words, {"-nostdin", "-hide_banner", "-loglevel", "error", "-f", "rawvideo",
+  // Without -xerror it ends with code 0 if only the end of the file could not be written.
+  append(words, {"-nostdin", "-hide_banner", "-loglevel", "error", "-xerror", "-f", "rawvideo",
                  "-pixel_format", "rgb24", "-video_size"});
   append(words, {size.c_str(), "-framerate", fps.c_str(), "-i", "pipe:0", "-an", "-vf"});
   append(words, {"scale=in_range=pc:out_range=tv:out_color_matrix=bt709:"

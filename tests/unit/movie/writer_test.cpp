@@ -179,6 +179,23 @@ TEST(MovieWriter, TheEndOfAMessageIsKept) {
   EXPECT_THAT(child->messages(), HasSubstr("No space left"));
 }
 
+// The whole of a small WebM is written at its end.
+TEST(MovieWriter, AVideoWhoseEndCannotBeWrittenFails) {
+  const auto ffmpeg = find_ffmpeg();
+  ASSERT_TRUE(ffmpeg) << ffmpeg.error().message;
+  const int full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
+  ASSERT_GE(full, 0);
+  Options options;
+  options.container = Container::webm;
+  auto child = Child::start(ffmpeg->program, arguments_of(options, "libvpx-vp9", 64, 64), full);
+  ::close(full);
+  ASSERT_TRUE(child) << child.error().message;
+  ASSERT_TRUE(child->write(picture_of(64, 64, 0), {}));
+  const auto done = child->finish({});
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::out_of_memory) << done.error().message;
+}
+
 TEST(MovieWriter, OneThatReadsNothingOrDoesNotEndIsTerminated) {
   const MovieFolder folder;
   put_ffmpeg(folder, "time.sleep(1000)");
