@@ -119,8 +119,10 @@ std::string text_on_cases() {
 }  // namespace
 
 int run(int argc, const char* const* argv) {
-  // A closed pipe is a write error and must not kill the process.
+  // A closed pipe and a file above the permitted size are write errors, which must not kill the
+  // process.
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     if (argc == 2 && std::string_view(argv[1]) == "load") return load();
     data::loader::set_program("/proc/self/exe");

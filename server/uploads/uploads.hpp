@@ -23,7 +23,7 @@ inline constexpr int keep_s_max = 7 * 86400;
 
 struct Options {
   std::filesystem::path folder;  // private; uploads are removed from it at both ends
-  std::uint64_t bytes_max = 0;   // of all files, 4 KiB at least; one address may have half of it
+  std::uint64_t bytes_max = 0;   // of all files, 8 KiB at least; one address may have half of it
 };
 
 struct Upload {
@@ -31,6 +31,7 @@ struct Upload {
   std::uint64_t bytes = 0;
   Sha256 digest{};
   std::time_t expires = 0;
+  std::uint64_t number = 0;  // tells later uploads of the same id apart
 };
 
 // What is announced of an upload.
@@ -75,7 +76,7 @@ class Uploads {
   [[nodiscard]] Result<Upload> find(const std::string& id) const;
 
   // Notes that a dataset was opened from it. False: it is gone.
-  bool opened(const std::string& id, const std::string& dataset);
+  bool opened(const Upload& upload, const std::string& dataset);
   // Removes an upload; the value: the datasets opened from it. Errors: not_found.
   Result<std::vector<std::string>> remove(const std::string& id);
   // The same for those that have expired.
@@ -101,7 +102,7 @@ class Incoming {
   // The same for all uploads that an address sends at a time.
   [[nodiscard]] const std::shared_ptr<const void>& address_key() const { return address_key_; }
 
-  // Errors: out_of_memory (quota, disk full), internal (disk).
+  // Errors: out_of_memory (quota, disk full), internal (disk); nothing of it remains then.
   Result<void> write(std::span<const std::byte> bytes);
   // Makes it visible, or discards it. Errors: invalid (another digest than announced); cancelled;
   // those of write(); of a ZIP archive, which is unpacked, bad_data.
@@ -113,6 +114,7 @@ class Incoming {
            std::shared_ptr<const void> address_key);
 
   Result<void> open_file();
+  Result<void> store(std::span<const std::byte> bytes);
   Result<Upload> publish(const CancelToken& cancel);
   void discard();
 

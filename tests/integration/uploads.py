@@ -10,6 +10,7 @@ import io
 import json
 import os
 import pathlib
+import resource
 import shutil
 import socket
 import stat
@@ -162,7 +163,7 @@ class Uploads(WithUploads):
         with self.begun("c.raw", half, half - 100):
             self.wait_until(lambda: self.bytes_on_disk() == half - PART)
             self.assert_refused(self.put("b.raw", bytes(PART + 1)), 507, "are left")
-            self.assert_refused(self.put("c.raw", b"x"), 409, "exists")
+            self.assert_refused(self.put("c.raw", b"x"), 409, "is being received")
         self.wait_until(lambda: self.put("b.raw", bytes(half)).status == 201)
 
     def test_an_address_keeps_half_of_all_uploads(self):
@@ -193,7 +194,10 @@ class Uploads(WithUploads):
             self.assertEqual(self.put("quick.raw", bytes(half - PART)).status, 201)
             slow.sendall(bytes(PART))
             self.assertIn(b" 507 ", slow.recv(4000).split(b"\r\n")[0])
-        self.wait_until(lambda: self.files() == ["quick/quick.raw"])
+            # Nothing waits for the end of its connection.
+            self.assertEqual(self.files(), ["quick/quick.raw"])
+            self.assertEqual(self.put("slow.raw", bytes(4096)).status, 201)
+            self.daemon.ask("DELETE", "/v1/uploads/slow.raw")
         self.assertEqual(self.put("more.raw", bytes(PART)).status, 201)
 
     def test_a_client_that_trickles_is_cut_off(self):
@@ -369,6 +373,19 @@ class Uploads(WithUploads):
         self.assertIn("has other files", done.stderr)
         self.assertEqual(self.files(), ["mine.nc"])
 
+    def test_a_limit_on_the_size_of_files_is_a_full_disk(self):
+        self.daemon.end()
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, before[1]))
+        try:
+            self.daemon = Daemon(PROGRAM, "tornado", "--state-dir", self.state,
+                                 "--upload-limit", "8M")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        self.assert_refused(self.put("large.raw", bytes(3 << 20)), 507, "too large")
+        self.assertEqual(self.files(), [])
+        self.assertEqual(self.put("small.raw", bytes(1 << 19)).status, 201)
+
     def test_names_and_parameters_are_checked(self):
         for name in ("..", "a%2Fb", ".hidden", "a..b", "a.", "-a", "a%20b", "a*", "a%00", "x" * 81):
             answer = self.put(name, b"x")
@@ -378,6 +395,7 @@ class Uploads(WithUploads):
         self.assert_refused(self.put("a.nc", b"x", "?keep=9999999"), 422, "604800")
         self.assert_refused(self.put("a.nc", b"x", "?size=1"), 400, "'size'")
         self.assert_refused(self.put("a.nc", b"x", Content_Encoding="gzip"), 415, "Encoding")
+        self.assert_refused(self.put("a.nc", b"x", Content_Range="bytes 0-0/9"), 400, "whole")
         self.assertEqual(self.put("a.nc", b"x").status, 201)
         answer = self.put("a.nc", b"x")
         self.assert_refused(answer, 409, "exists")
@@ -405,7 +423,8 @@ class Uploads(WithUploads):
             self.assert_refused(answer, 403, "--upload-limit")
         self.assertFalse((self.state / "uploads").exists())
         for given, text in ((["--upload-limit", "4M"], "--state-dir"),
-                            (["--upload-limit", "much", "--state-dir", self.state], "much")):
+                            (["--upload-limit", "much", "--state-dir", self.state], "much"),
+                            (["--upload-limit", "8191", "--state-dir", self.state], "8K")):
             done = subprocess.run([PROGRAM, "serve", "tornado", "--listen", "127.0.0.1:0", *given],
                                   capture_output=True, text=True, check=False, timeout=30)
             self.assertNotEqual(done.returncode, 0)

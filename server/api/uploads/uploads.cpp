@@ -128,6 +128,10 @@ StreamedBody receive_upload(const ServerOptions& options, const UploadThreads& t
     return {nullptr, http::problem_response(415, "Unsupported Media Type",
                                             "an upload may have no Content-Encoding")};
   }
+  if (!request.header("Content-Range").empty()) {
+    return {nullptr, http::problem_response(400, "Bad Request",
+                                            "an upload is sent whole, without Content-Range")};
+  }
   const auto announced = read_announced(id, request, bytes);
   if (!announced) return {nullptr, http::problem_response(announced.error())};
   auto into = options.uploads->begin(*announced);

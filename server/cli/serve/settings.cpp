@@ -217,6 +217,11 @@ Result<std::uint64_t> upload_bytes(const ServeArguments& arguments) {
     return make_error(ErrorKind::invalid,
                       "--upload-limit needs --state-dir, below which uploads are kept");
   }
+  constexpr std::uint64_t least = 8192;  // an address may have half, and an upload takes 4 KiB
+  if (*bytes < least) {
+    return make_error(ErrorKind::invalid,
+                      "--upload-limit '" + printable(text) + "' is less than 8K, and not 0");
+  }
   return *bytes;
 }
 
