@@ -105,6 +105,18 @@ class Archives(WithUploads):
         self.assertEqual(len(self.files()), 70_000)
         self.assertEqual((self.state / "uploads/a/a.zip/69999").read_bytes(), b"69999")
 
+    def test_as_many_entries_as_the_mark_of_zip64(self):
+        self.restart("2G")
+        self.assertEqual(self.put("a.zip", zipped({f"{n}": b"" for n in range(65_535)})).status,
+                         201)
+        self.assertEqual(len(self.files()), 65_535)
+
+    def test_the_last_entry_of_a_name_counts(self):
+        body = zipped({"a": b"first", "b": b"other", special("a", 0o100644): b"last"})
+        self.assertEqual(self.put("a.zip", body).status, 201)
+        self.assertEqual((self.state / "uploads/a/a.zip/a").read_bytes(), b"last")
+        self.assertEqual((self.state / "uploads/a/a.zip/b").read_bytes(), b"other")
+
     def test_the_daemon_itself_parses_no_archive(self):
         body = zipped({f"{n}": os.urandom(64) for n in range(300)})
         pid = self.daemon.process.pid
@@ -224,8 +236,7 @@ class Archives(WithUploads):
                                          zipped({special("a", 0o10644): b""})],
             "more than 200 times": [zipped({"a": bytes(2 << 20)}, zipfile.ZIP_DEFLATED)],
             "more than 100000 entries": [zip64(good, entries=n) for n in (100_001, 2**64 - 1)],
-            "twice": [zipped({"a": b"1", special("a", 0o100644): b"2"}),
-                      zipped({"a": b"1", "a/b": b"2"}), zipped({"a": b"1", "a/": b""}),
+            "twice": [zipped({"a": b"1", "a/b": b"2"}), zipped({"a": b"1", "a/": b""}),
                       zipped({"a/b": b"1", "a": b"2"})],
             "checksum": [good.replace(b"x" * 100, b"x" * 99 + b"z")],
             "encrypted": [patched(entry + 8, 1, 2)],
@@ -259,6 +270,11 @@ class Archives(WithUploads):
         entry = body.index(b"PK\1\2")
         body = body[:entry + 24] + (1000).to_bytes(4, "little") + body[entry + 28:]
         self.assert_refused(self.put("a.zip", body), 422, "longer than it declares")
+        self.assertEqual(self.files(), [])
+
+    def test_what_can_never_fit_is_too_large(self):
+        body = zipped({f"{name}": b"" for name in range(LIMIT // 2 // 4096 + 1)})
+        self.assert_refused(self.put("a.zip", body), 413, "half of --upload-limit")
         self.assertEqual(self.files(), [])
 
     def test_quota_counts_what_is_unpacked(self):

@@ -143,7 +143,10 @@ Result<Directory> find_directory(int file, std::uint64_t file_bytes) {
     if (at + end_bytes + u16(*tail, at + 20) != count) continue;  // its comment ends the file
     const std::uint64_t end_at = file_bytes - count + at;
     const Directory found{u32(*tail, at + 16), u32(*tail, at + 12), u16(*tail, at + 10), end_at};
-    if (found.at == elsewhere32 || found.bytes == elsewhere32 || found.entries == elsewhere16) {
+    const bool has_locator = at >= locator_bytes && u32(*tail, at - locator_bytes) == locator_mark;
+    // As many entries as the mark of ZIP64 says are possible without it.
+    if (found.at == elsewhere32 || found.bytes == elsewhere32 ||
+        (found.entries == elsewhere16 && has_locator)) {
       return find_directory64(file, end_at);
     }
     return checked_directory(found, u16(*tail, at + 4) != 0 || u16(*tail, at + 6) != 0 ||
@@ -232,6 +235,18 @@ Result<void> check_sums(const std::vector<ZipEntry>& entries, std::uint64_t dire
     bytes += entry.bytes;
   }
   return {};
+}
+
+// The last entry of a name replaces the earlier ones: writers that only append change files so.
+std::vector<ZipEntry> last_of_names(std::vector<ZipEntry> entries) {
+  std::set<std::string> names;
+  std::vector<ZipEntry> out;
+  out.reserve(entries.size());
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
+    if (names.insert(entry->name).second) out.push_back(std::move(*entry));
+  }
+  std::reverse(out.begin(), out.end());
+  return out;
 }
 
 // Counts the bytes of an entry while it passes them on.
@@ -344,7 +359,7 @@ Result<std::vector<ZipEntry>> list_zip(int file) {
   }
   if (!rest.empty()) return bad_zip("has a malformed directory");
   if (const auto ok = check_sums(out, directory->at); !ok) return ok.error();
-  return out;
+  return last_of_names(std::move(out));
 }
 
 std::uint64_t disk_bytes_of(const std::vector<ZipEntry>& entries) {
