@@ -97,9 +97,9 @@ class Control {
     {
       const std::lock_guard lock(mutex_);
       reload_wanted_ = server_ == nullptr;
-      if (reload_wanted_) return;
+      if (reload_wanted_ || draining_) return;
+      manager_->reloading();
     }
-    manager_->reloading();
     const bool reloaded = reload_now([this](transport::Access access) {
       const std::lock_guard lock(mutex_);
       if (server_ != nullptr) server_->change(std::move(access));
