@@ -5,6 +5,7 @@ import base64
 import concurrent.futures
 import contextlib
 import dataclasses
+import errno
 import os
 import pathlib
 import re
@@ -172,6 +173,8 @@ def _suffix_of(path: pathlib.Path) -> str:
 @contextlib.contextmanager
 def _part_of(path: pathlib.Path) -> Iterator[pathlib.Path]:
     """An empty file to write to, which becomes `path` unless there is an error."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     part = path.with_name(f".{path.name}.part")
     part.touch()  # a folder that cannot be written is found before pictures are drawn
     try:
