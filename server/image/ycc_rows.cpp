@@ -2,6 +2,8 @@
 // set. Targets with fused multiply-add agree exactly, the others within one code.
 #include "server/image/ycc_rows.hpp"
 
+// Vectors of SVE cannot be members; arm64 has NEON always.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/image/ycc_rows.cpp"
 #include <hwy/foreach_target.h>  // what follows is compiled for every target

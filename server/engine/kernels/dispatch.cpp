@@ -44,6 +44,9 @@ std::vector<const Table*> usable_tables() {
     usable.push_back(&avx512_table());
   }
 #endif
+#ifdef WINDSPLAT_KERNELS_NEON
+  usable.push_back(&neon_table());  // part of every arm64 processor
+#endif
   return usable;
 }
 

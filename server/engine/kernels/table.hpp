@@ -84,5 +84,6 @@ const Table& portable_table();
 const Table& sse4_table();
 const Table& avx2_table();
 const Table& avx512_table();
+const Table& neon_table();
 
 }  // namespace windsplat::engine::kernels
