@@ -3,19 +3,28 @@
 # build web installs; lintian, if installed, checks the packages. Equal sources give equal packages:
 # times are those of the last commit, or SOURCE_DATE_EPOCH.
 # Usage: deploy/build-packages.sh [BUILD]
-# BUILD is a build folder of the preset release; by default build/package, made if needed.
+# BUILD is a build folder of the preset release; by default build/package, made if needed. With
+# build/arm64, which scripts/build-arm64 makes, the packages are of arm64, in build/dist-arm64.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
 build=${1:-build/package}
 dist=build/dist
 log=build/packages.log
+cross=()
+sysroot=
+if [ "$build" = build/arm64 ]; then
+  dist=build/dist-arm64
+  cross=(dpkg-architecture -aarm64 -c)
+  sysroot=$PWD/build/arm64-sysroot
+fi
 
 fail() {
   echo "build-packages: $*" >&2
   exit 1
 }
 command -v dh >/dev/null || fail "debhelper not found; run apt-get install debhelper"
+[ -z "$sysroot" ] || [ -d "$sysroot" ] || fail "no $sysroot; run scripts/build-arm64"
 [ -e web/node_modules ] || fail "no node modules; run scripts/setup build web"
 
 version=$(sed -n 's/^project(windsplat VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
@@ -26,7 +35,8 @@ export SOURCE_DATE_EPOCH
 
 mkdir -p "$dist"
 rm -f "$dist"/*.deb
-debian/rules clean binary BUILD="$build" DIST="$dist" >"$log" 2>&1 || {
+"${cross[@]}" debian/rules clean binary BUILD="$build" DIST="$dist" SYSROOT="$sysroot" \
+  >"$log" 2>&1 || {
   tail -n 20 "$log" >&2
   fail "the whole log is $log"
 }
