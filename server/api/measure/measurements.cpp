@@ -330,8 +330,15 @@ void get_range(tasks::Backend& backend, const std::string& id, const std::string
               [subject = *subject, step = *step] { return step_range(subject, step); });
     return;
   }
-  if (step)
-    return refuse(make_error(ErrorKind::invalid, "query parameter 'step' requires of=step"));
+  const auto is_of_step = [](const auto& given) {
+    return given.first == parameters::step.name || given.first == parameters::time.name ||
+           given.first == parameters::nearest.name;
+  };
+  const auto given = std::find_if(request.query.begin(), request.query.end(), is_of_step);
+  if (given != request.query.end()) {
+    return refuse(
+        make_error(ErrorKind::invalid, "query parameter '" + given->first + "' requires of=step"));
+  }
   if (const auto ok = check_steps(subject->dataset->info()); !ok) return refuse(ok.error());
   answer_range_of_all(backend, std::move(*subject), request, std::move(reply));
 }

@@ -274,6 +274,7 @@ TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   EXPECT_EQ(server_.loads(), 3U) << "cached though evicted";
   expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
+  expect_problem_saying(refused("fields/" + name + "/range?of=all&datetime=2001-01-01"), 422);
 }
 
 // The page goes to the maximum of what is drawn.
