@@ -136,8 +136,9 @@ Result<void> check_origins(const std::vector<std::string>& origins) {
 bool lies_below(const std::filesystem::path& folder, const std::filesystem::path& root) {
   if (root.empty()) return false;
   std::error_code fault;
-  const auto inner = std::filesystem::weakly_canonical(folder, fault);
-  const auto outer = std::filesystem::weakly_canonical(root, fault);
+  // A relative path of which nothing exists would stay relative.
+  const auto inner = std::filesystem::weakly_canonical(std::filesystem::absolute(folder), fault);
+  const auto outer = std::filesystem::weakly_canonical(std::filesystem::absolute(root), fault);
   return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
