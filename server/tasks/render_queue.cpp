@@ -67,6 +67,7 @@ std::uint64_t number_of(RenderKind kind) { return static_cast<std::uint64_t>(kin
 void RenderQueue::push(RenderJob job, std::int64_t now_us) {
   const RenderKind kind = job.kind;
   const std::uint64_t owner = job.owner;
+  const bool interrupts = kind != RenderKind::background && !job.is_background_turn;
   Line& line = line_of(kind);
   // Allocate first; an idle party without usage has no effect on the shares.
   std::map<std::uint64_t, Jobs> fresh;
@@ -78,10 +79,10 @@ void RenderQueue::push(RenderJob job, std::int64_t now_us) {
   ++arrivals_;
   ++waiting_;
   line.shares.come(owner);
-  if (kind != RenderKind::background) {
-    if (running_ && running_->kind == RenderKind::background) running_->cancel.cancel();
-    kinds_.come(number_of(kind));
+  if (interrupts && running_ && running_->kind == RenderKind::background) {
+    running_->cancel.cancel();
   }
+  if (kind != RenderKind::background) kinds_.come(number_of(kind));
   line.owners.merge(fresh);
   if (fresh.empty()) return;
   Jobs& earlier = line.owners.find(owner)->second;
@@ -179,7 +180,7 @@ RenderQueue::Load RenderQueue::sum(double unknown_ms, const Wanted& wanted) cons
   for (const auto& [owner, jobs] : lines_[number_of(RenderKind::request)].owners) {
     for (const Waiting& waiting : jobs) {
       const RenderJob& job = waiting.next.job;
-      if (job.cancel.cancelled() || !wanted(job)) continue;
+      if (job.cancel.cancelled() || job.is_background_turn || !wanted(job)) continue;
       ++load.count;
       load.cost_ms += job.cost_ms > 0 ? job.cost_ms : unknown_ms;
     }

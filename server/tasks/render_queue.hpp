@@ -32,6 +32,9 @@ struct RenderJob {
   double cost_ms = 0;         // estimate; 0: unknown
   std::string payer = {};     // address charged with the time; empty: none
   std::int64_t spent_us = 0;  // time of other threads for this job, charged with it
+  // A request that is background work in its turn: it interrupts no other background work, and
+  // nobody is refused because of it.
+  bool is_background_turn = false;
 };
 
 // Usage of a shared resource by several parties. A party that becomes active again starts at the

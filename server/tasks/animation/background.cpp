@@ -38,6 +38,7 @@ RenderJob job_of(const BackgroundOwner& owner, bool insists, const std::shared_p
   RenderJob job;
   job.kind = insists ? RenderKind::request : RenderKind::background;
   job.admitted = true;  // as a job
+  job.is_background_turn = insists;
   job.owner = owner.owner;
   job.payer = owner.payer;
   job.cost_ms = owner.cost_ms;

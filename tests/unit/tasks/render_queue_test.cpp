@@ -150,6 +150,28 @@ TEST(RenderQueue, BackgroundWaitsForAllOthers) {
   EXPECT_EQ(renderer.run(costs, false), 1U);
 }
 
+TEST(RenderQueue, BackgroundWorkInItsTurnInterruptsNoOtherAndRefusesNobody) {
+  RenderQueue queue;
+  RenderJob job;
+  job.kind = RenderKind::background;
+  job.owner = 1;
+  queue.push(job, 0);
+  ASSERT_TRUE(queue.pop());
+  RenderJob turn;
+  turn.kind = RenderKind::request;
+  turn.owner = 2;
+  turn.payer = "a";
+  turn.cost_ms = 1000;
+  turn.is_background_turn = true;
+  queue.push(turn, 0);
+  EXPECT_FALSE(job.cancel.cancelled());
+  EXPECT_EQ(queue.requests_waiting().count, 0U);
+  EXPECT_EQ(queue.requests_before("b", 0).cost_ms, 0);
+  queue.done(1);
+  ASSERT_TRUE(queue.pop());
+  EXPECT_TRUE(queue.empty());
+}
+
 TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     RenderQueue queue;
