@@ -128,25 +128,27 @@ void Child::read_messages() {
   }
 }
 
-void Child::wait(bool to_write) {
+Clock::duration Child::wait(bool to_write) {
+  const Clock::time_point since = Clock::now();
   // A negative descriptor is ignored (poll(2)).
   std::array<pollfd, 2> events{
       {{errors_.number(), POLLIN, 0}, {to_write ? input_.number() : -1, POLLOUT, 0}}};
   ::poll(events.data(), events.size(), look_every_ms);
   read_messages();
+  return std::min<Clock::duration>(Clock::now() - since, std::chrono::milliseconds(look_every_ms));
 }
 
 Result<void> Child::write(std::span<const std::uint8_t> bytes, const CancelToken& cancel) {
-  Clock::time_point since = Clock::now();
+  Clock::duration waited{};
   while (!bytes.empty()) {
     if (cancel.cancelled()) return was_cancelled();
-    if (Clock::now() - since > patience_) return stalled("read nothing");
+    if (waited > patience_) return stalled("read nothing");
     const ssize_t sent = ::send(input_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
-      since = Clock::now();
+      waited = {};
     } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-      wait(true);
+      waited += wait(true);
     } else if (errno != EINTR) {  // it reads no more: it has ended, or is about to
       const auto ended = status(cancel);
       return ended ? failed(*ended) : ended.error();
@@ -157,11 +159,11 @@ Result<void> Child::write(std::span<const std::uint8_t> bytes, const CancelToken
 
 Result<int> Child::status(const CancelToken& cancel) {
   input_.reset();
-  const Clock::time_point end = Clock::now() + patience_;
+  Clock::duration waited{};
   while (errors_) {
     if (cancel.cancelled()) return was_cancelled();
-    if (Clock::now() > end) return stalled("did not end");
-    wait(false);
+    if (waited > patience_) return stalled("did not end");
+    waited += wait(false);
   }
   while (true) {
     int status = 0;
@@ -171,8 +173,10 @@ Result<int> Child::status(const CancelToken& cancel) {
       return status;
     }
     if (cancel.cancelled()) return was_cancelled();
-    if (Clock::now() > end) return stalled("did not end");
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (waited > patience_) return stalled("did not end");
+    constexpr std::chrono::milliseconds moment{1};
+    std::this_thread::sleep_for(moment);
+    waited += moment;
   }
 }
 
@@ -194,9 +198,10 @@ Error Child::failed(int status) const {
   if (!said.empty()) text += ": " + printable(said, 1000);
   // ENOSPC, EDQUOT and EFBIG in LC_ALL=C.
   constexpr std::array faults{"No space left on device", "Disk quota exceeded", "File too large"};
-  const bool full = std::any_of(faults.begin(), faults.end(), [&](const char* fault) {
-    return said.find(fault) != std::string::npos;
-  });
+  const bool too_large = WIFSIGNALED(status) && WTERMSIG(status) == SIGXFSZ;
+  const bool full = too_large || std::any_of(faults.begin(), faults.end(), [&](const char* fault) {
+                      return said.find(fault) != std::string::npos;
+                    });
   return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(text));
 }
 

@@ -54,8 +54,9 @@ class Child {
   Child() = default;
   void read_messages();
   void kill_and_reap() noexcept;
-  // Waits up to 50 ms for messages, and with `to_write` for room in the input.
-  void wait(bool to_write);
+  // Waits up to 50 ms for messages, and with `to_write` for room in the input. The time waited: not
+  // longer, if this process was stopped meanwhile.
+  std::chrono::steady_clock::duration wait(bool to_write);
   // Waits for its end. Errors: cancelled.
   Result<int> status(const CancelToken& cancel);
   [[nodiscard]] Error failed(int status) const;
