@@ -76,16 +76,15 @@ http::Response open_upload(const ServerOptions& options, tasks::Backend& backend
   const auto refuse = [](const Error& error) {
     return http::problem_response(make_error_at(error.kind, "/upload", error.message));
   };
-  const auto upload = uploads->find(id);
-  if (!upload) return refuse(upload.error());
+  if (const auto upload = uploads->find(id); !upload) return refuse(upload.error());
   const auto located =
       data::locate_beneath(uploads->folder().native(), uploads::Uploads::path_of(id));
   if (!located) return refuse(located.error());
   return open_in_job(backend, options.base_path,
                      [&backend, uploads, location = *located,
-                      upload = *upload](const CancelToken& cancel) -> Result<std::string> {
+                      id](const CancelToken& cancel) -> Result<std::string> {
                        auto dataset = backend.catalogue.open(location, cancel);
-                       if (!dataset || uploads->opened(upload, *dataset)) return dataset;
+                       if (!dataset || uploads->opened(id, *dataset)) return dataset;
                        backend.catalogue.forget(*dataset);
                        return make_error(ErrorKind::not_found, "the upload was removed");
                      });

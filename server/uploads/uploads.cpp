@@ -113,9 +113,11 @@ struct Uploads::State {
     const fs::path folder = folder_beside(path);
     if (::mkdir(folder.c_str(), S_IRWXU) != 0) return not_stored(errno);
     const auto reserve = [&](std::uint64_t bytes) -> Result<void> {
-      if (bytes > options.bytes_max / 2) {
+      // The archive exists until it is unpacked.
+      const std::uint64_t both = bytes + charge_of(announced.bytes);
+      if (both > options.bytes_max / 2) {
         return make_error(ErrorKind::too_large,
-                          "the archive unpacked takes " + std::to_string(bytes) +
+                          "the archive and its files take " + std::to_string(both) +
                               " bytes, above the limit of " +
                               std::to_string(options.bytes_max / 2) + ", half of --upload-limit");
       }
@@ -211,7 +213,7 @@ struct Uploads::State {
   Options options;
   std::mutex mutex;
   std::uint64_t bytes_taken = 0;
-  std::uint64_t count = 0;  // names of incomplete files, numbers of uploads
+  std::uint64_t count = 0;  // names of incomplete files
   std::map<std::string, Entry> entries;
   std::map<std::string, std::uint64_t> receiving;  // ids, and the bytes that each has taken
   std::map<std::string, Share> shares;
@@ -317,10 +319,10 @@ Result<Upload> Uploads::find(const std::string& id) const {
                     "there is no upload '" + printable(id, id_chars_max) + "'");
 }
 
-bool Uploads::opened(const Upload& upload, const std::string& dataset) {
+bool Uploads::opened(const std::string& id, const std::string& dataset) {
   const std::lock_guard lock(state_->mutex);
-  const auto at = state_->entries.find(upload.id);
-  if (at == state_->entries.end() || at->second.upload.number != upload.number) return false;
+  const auto at = state_->entries.find(id);
+  if (at == state_->entries.end()) return false;
   auto& datasets = at->second.datasets;
   if (std::find(datasets.begin(), datasets.end(), dataset) == datasets.end()) {
     datasets.push_back(dataset);
@@ -441,7 +443,7 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
   if (archive) {
     if (const auto ok = state_->unpack(announced_, path_, cancel); !ok) return ok.error();
   }
-  Upload upload{announced_.id, announced_.bytes, digest};
+  Upload upload{announced_.id, announced_.bytes, digest, 0};
   std::uint64_t spare = 0;  // bytes that are released when the archive is removed
   {
     const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
@@ -454,7 +456,6 @@ Result<Upload> Incoming::publish(const CancelToken& cancel) {
     if (::rename(from.c_str(), path.c_str()) != 0) return not_stored(errno);
     ended_ = true;
     upload.expires = std::time(nullptr) + announced_.keep_s;
-    upload.number = state_->count++;
     const std::uint64_t taken = state_->receiving[announced_.id];
     // The folder of an archive takes a block, even if it is empty.
     if (archive) spare = std::min(charge_of(announced_.bytes), taken - block_bytes);

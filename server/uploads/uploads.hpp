@@ -31,7 +31,6 @@ struct Upload {
   std::uint64_t bytes = 0;
   Sha256 digest{};
   std::time_t expires = 0;
-  std::uint64_t number = 0;  // tells later uploads of the same id apart
 };
 
 // What is announced of an upload.
@@ -76,7 +75,7 @@ class Uploads {
   [[nodiscard]] Result<Upload> find(const std::string& id) const;
 
   // Notes that a dataset was opened from it. False: it is gone.
-  bool opened(const Upload& upload, const std::string& dataset);
+  bool opened(const std::string& id, const std::string& dataset);
   // Removes an upload; the value: the datasets opened from it. Errors: not_found.
   Result<std::vector<std::string>> remove(const std::string& id);
   // The same for those that have expired.

@@ -75,21 +75,6 @@ TEST_F(UploadThreads, OneWhoseClientHasLeftIsDiscardedAtTheEnd) {
   EXPECT_TRUE(uploads->begin({.id = "a.nc", .bytes = 1, .digest = {}, .address = "a"}));
 }
 
-TEST_F(UploadThreads, ALaterOneOfTheSameIdIsAnother) {
-  const auto uploads = Uploads::open({root_ / "others", quota_bytes}).value();
-  const auto sent = [&] {
-    const auto into = uploads->begin({.id = "a.nc", .bytes = 1, .digest = {}, .address = "a"});
-    EXPECT_TRUE((*into)->write(std::vector<std::byte>(1)));
-    return (*into)->finish({}).value();
-  };
-  const auto first = sent();
-  ASSERT_TRUE(uploads->remove("a.nc"));
-  const auto second = sent();
-  EXPECT_FALSE(uploads->opened(first, "opened-from-the-first"));
-  EXPECT_TRUE(uploads->opened(second, "a"));
-  EXPECT_THAT(uploads->remove("a.nc").value(), testing::ElementsAre("a"));
-}
-
 std::string body_of(int seed, std::size_t bytes) {
   std::string out(bytes, '\0');
   auto state = static_cast<std::uint32_t>(seed * 2654435761U + 1U);
