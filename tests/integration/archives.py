@@ -107,9 +107,13 @@ class Archives(WithUploads):
 
     def test_as_many_entries_as_the_mark_of_zip64(self):
         self.restart("2G")
-        self.assertEqual(self.put("a.zip", zipped({f"{n}": b"" for n in range(65_535)})).status,
-                         201)
+        body = zipped({f"{n}": b"" for n in range(65_535)})
+        self.assertEqual(self.put("a.zip", body).status, 201)
         self.assertEqual(len(self.files()), 65_535)
+        # With the longest comment the locator is before the end that is searched for the record.
+        plain = zipped({"a": b"x" * 100, "b": b"y"})
+        commented = zip64(plain)[:-2] + b"\xff\xff" + b"c" * 65_535
+        self.assertEqual(self.put("b.zip", commented).status, 201)
 
     def test_the_last_entry_of_a_name_counts(self):
         body = zipped({"a": b"first", "b": b"other", special("a", 0o100644): b"last"})

@@ -134,8 +134,8 @@ Result<Directory> find_directory64(int file, std::uint64_t end_at) {
 
 Result<Directory> find_directory(int file, std::uint64_t file_bytes) {
   if (file_bytes < end_bytes) return bad_zip("is shorter than its end record");
-  const auto count =
-      static_cast<std::size_t>(std::min<std::uint64_t>(file_bytes, end_bytes + comment_bytes_max));
+  const auto count = static_cast<std::size_t>(
+      std::min<std::uint64_t>(file_bytes, locator_bytes + end_bytes + comment_bytes_max));
   const auto tail = read_at(file, file_bytes - count, count);
   if (!tail) return tail.error();
   for (std::size_t at = count - end_bytes + 1; at-- > 0;) {
@@ -200,7 +200,9 @@ Result<std::pair<ZipEntry, std::size_t>> read_entry(Span bytes) {
   out.header_at = u32(bytes, 42);
   const std::uint32_t method = u16(bytes, 10);
   out.deflated = method == Z_DEFLATED;
-  if (!is_path_within(out.name)) return bad_entry(out, "whose name is not a path within it");
+  if (!is_path_within(out.name)) {
+    return bad_entry(out, "whose name is not a path within it, of printable ASCII");
+  }
   if ((u16(bytes, 8) & 1U) != 0) return bad_entry(out, "that is encrypted");
   if (method != 0 && !out.deflated) return bad_entry(out, "that is neither stored nor deflated");
   if (!is_file_or_folder(u16(bytes, 4), u32(bytes, 38))) {
