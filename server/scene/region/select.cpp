@@ -89,6 +89,16 @@ Error empty(const char* key, const Range& range, const Axis& axis, bool columns)
   text << "no sample of axis " << in_double_quotes(axis.name) << " is within "
        << text_of(range[0], range[1]) << ": its coordinates are " << text_of(axis.coordinates);
   if (!axis.units.empty()) text << ' ' << printable(axis.units, 80);
+  // Of a range between two samples it would seem to contradict itself.
+  const double* below = nullptr;
+  const double* above = nullptr;
+  for (const double& one : axis.coordinates) {
+    if (one < range[0] && (below == nullptr || one > *below)) below = &one;
+    if (one > range[1] && (above == nullptr || one < *above)) above = &one;
+  }
+  if (below != nullptr && above != nullptr) {
+    text << ", of which those beside it are " << text_of(*below, *above);
+  }
   if (columns && *key != 'z') text << "; /region/longitudes and /region/latitudes take degrees";
   return invalid_at(std::string("/region/") + key, text.str());
 }

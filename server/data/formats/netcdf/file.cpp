@@ -151,10 +151,14 @@ Result<void> File::look_before_opening() {
   if (!classic_) {
     if (has_hdf5_signature(*input_)) return {};
     constexpr std::array<unsigned char, 4> hdf4{0x0e, 0x03, 0x13, 0x01};
-    return magic == hdf4 ? fault("is HDF4, which is not supported; convert it with h4toh5")
-                         : fault(
-                               "is not a netCDF file, nor of another supported format: its first "
-                               "bytes match no known signature");
+    constexpr std::array<unsigned char, 4> npy{0x93, 'N', 'U', 'M'};
+    if (magic == hdf4) return fault("is HDF4, which is not supported; convert it with h4toh5");
+    if (magic == npy) {
+      return fault("is NPY, which tells no axes: open a description in JSON that names it as raw");
+    }
+    return fault(
+        "is not a netCDF file, nor of another supported format: its first bytes match no known "
+        "signature");
   }
   Window window(*input_);
   const auto expected =

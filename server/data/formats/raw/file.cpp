@@ -74,7 +74,7 @@ class Opener {
             in_quotes(name) + " has " + std::to_string(extent.size) + " bytes, " +
                 in_quotes(input_->name()) + " describes " + std::to_string(extent.described) +
                 ": the rest is not a whole step of " + std::to_string(extent.step_bytes.front()) +
-                " bytes, so that dims or type cannot be right");
+                " bytes, so that dims, type or offset cannot be right");
       }
       if (++longer > 1) continue;
       const std::uint64_t steps = rest / *step;
