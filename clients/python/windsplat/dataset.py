@@ -305,14 +305,17 @@ class Dataset:
 
     def histogram(
         self, field: str, *, bins: int | None = None, range: tuple[float, float] | None = None,
-        step: int = 0,
+        step: int | None = None, time: Any = None, nearest: bool = False,
     ) -> Histogram:
-        """Counts of the values of a field at a step (of vectors of the magnitudes)."""
+        """Counts of the values of a field at a step (of vectors of the magnitudes).
+
+        step, time, nearest: the first step, or that number, or the step at a time: see step_at().
+        """
         import numpy as np
 
         ends = None if range is None else f"{range[0]!r},{range[1]!r}"
         document = self.server.http.get(f"{self._field(field)}/histogram", bins=bins, range=ends,
-                                        step=step)
+                                        step=self._step(step, time, nearest))
         counts = np.array(document["counts"], dtype=np.int64)
         low, high = document["range"]
         return Histogram(counts, np.linspace(low, high, len(counts) + 1), document["below"],
@@ -355,9 +358,13 @@ class Dataset:
         return Values(field, array, tuple(description["dims"]), coordinates,
                       description.get("units", ""), description["step"], description)
 
-    def range(self, field: str, *, step: int | None = None) -> tuple[float, float]:
-        """Least and greatest value of a field at a step; None: at all steps. NaN: all samples are
-        masked."""
+    def range(
+        self, field: str, *, step: int | None = None, time: Any = None, nearest: bool = False,
+    ) -> tuple[float, float]:
+        """Least and greatest value of a field at a step, or at a time (see step_at()); without
+        both at all steps. NaN: all samples are masked."""
+        if time is not None or nearest:
+            step = self._step(step, time, nearest)
         document = self.server.http.get(f"{self._field(field)}/range", step=step,
                                         of="all" if step is None else "step")
         low, high = document["range"] or (math.nan, math.nan)

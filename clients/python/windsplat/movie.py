@@ -192,9 +192,10 @@ def steps_of(steps: Steps | None, count: int) -> Sequence[int]:
     if isinstance(asked, Mapping) and asked.keys() <= set(RANGE):
         first, last, stride = (asked.get(key, value)
                                for key, value in zip(RANGE, (0, count - 1, 1)))
-        if 0 <= first <= last < count and stride >= 1:
+        whole = all(isinstance(one, int) for one in (first, last, stride))
+        if whole and 0 <= first <= last < count and stride >= 1:
             return range(first, last + 1, stride)
-    if isinstance(asked, (str, Mapping)):
+    if isinstance(asked, (str, bytes, Mapping)) or not isinstance(asked, Iterable):
         raise ValueError(f"steps={steps!r} are none of 0 to {count - 1}: give numbers, "
                          "'FIRST:LAST[:STRIDE]', or the keys first, last and stride")
     return [int(step) for step in asked]

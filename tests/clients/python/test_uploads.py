@@ -122,7 +122,8 @@ class Stores(unittest.TestCase):
     def test_a_store_with_what_is_no_file_of_its_own_is_not_sent(self):
         store = self.folder / "a.zarr"
         for make in (lambda path: path.symlink_to(self.folder), lambda path: os.mkfifo(path),
-                     lambda path: path.symlink_to("nowhere")):
+                     lambda path: path.symlink_to("nowhere"),
+                     lambda path: path.symlink_to("/etc/hostname")):
             write_store(store, np.zeros((2, 2, 2), "f4"), 2)
             make(store / "b" / "9")
             with self.assertRaisesRegex(ValueError, r"a\.zarr/b/9' is neither"):
