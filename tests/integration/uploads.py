@@ -116,10 +116,11 @@ class Uploads(WithUploads):
 
     def test_uploads_are_not_kept_below_the_data_root(self):
         root = pathlib.Path(self.folder.name)
-        for state in (root / "a" / "state", root, root / "a" / ".." / "state"):
+        for state in (root / "a" / "state", root, root / "a" / ".." / "state", "not-there-yet"):
             refused = subprocess.run(
-                [PROGRAM, "serve", "tornado", "--data-root", root, "--state-dir", state,
-                 "--upload-limit", "4M"], capture_output=True, text=True, check=False)
+                [pathlib.Path(PROGRAM).resolve(), "serve", "tornado", "--data-root", root,
+                 "--state-dir", state, "--upload-limit", "4M"], capture_output=True, text=True, check=False, cwd=root,
+                timeout=30)
             self.assertEqual(refused.returncode, 2, refused.stderr)
             self.assertIn("lies below --data-root", refused.stderr)
 
