@@ -119,8 +119,8 @@ class Uploads(WithUploads):
         for state in (root / "a" / "state", root, root / "a" / ".." / "state", "not-there-yet"):
             refused = subprocess.run(
                 [pathlib.Path(PROGRAM).resolve(), "serve", "tornado", "--data-root", root,
-                 "--state-dir", state, "--upload-limit", "4M"], capture_output=True, text=True, check=False, cwd=root,
-                timeout=30)
+                 "--state-dir", state, "--upload-limit", "4M"], capture_output=True, text=True,
+                check=False, cwd=root, timeout=30)
             self.assertEqual(refused.returncode, 2, refused.stderr)
             self.assertIn("lies below --data-root", refused.stderr)
 
