@@ -199,6 +199,8 @@ class Archives(WithUploads):
             self.stop_loaders(1)
             self.wait_until(lambda: self.cpu_limit(self.loaders()[0]) != "unlimited")
             self.assertLess(int(self.cpu_limit(self.loaders()[0])), 80)
+            time.sleep(0.5)
+            self.assertEqual(len(self.loaders()), 1)
             sent.append(clients.enter_context(self.begun("b.zip", body, "127.0.0.2")))
             self.stop_loaders(2)
             with self.begun("plain.nc", b"x" * 100_000, "127.0.0.2") as other:

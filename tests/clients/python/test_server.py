@@ -172,6 +172,10 @@ class Values(unittest.TestCase):
         histogram = self.dataset.histogram("cloud", bins=8, step=1)
         self.assertEqual(histogram.counts.sum() + histogram.masked, np.prod(self.dataset.shape))
         self.assertEqual((histogram.edges[0], histogram.edges[-1]), (low, high))
+        time = self.dataset.times[1]
+        self.assertEqual(self.dataset.range("cloud", time=time), (low, high))
+        of_time = self.dataset.histogram("cloud", bins=8, time=time)
+        np.testing.assert_array_equal(of_time.counts, histogram.counts)
         every = self.dataset.range("cloud")
         self.assertTrue(every[0] <= low and every[1] >= high)
 

@@ -11,16 +11,17 @@
 namespace windsplat::tasks {
 namespace {
 
+RenderJob job_of(RenderKind kind, std::uint64_t owner) {
+  RenderJob out;
+  out.kind = kind;
+  out.owner = owner;
+  return out;
+}
+
 // Owners that always have work: each submits its next job as soon as one was started.
 class Renderer {
  public:
-  RenderJob job(RenderKind kind, std::uint64_t owner) {
-    RenderJob out;
-    out.kind = kind;
-    out.owner = owner;
-    return out;
-  }
-  void ask(RenderKind kind, std::uint64_t owner) { queue_.push(job(kind, owner), now_us_); }
+  void ask(RenderKind kind, std::uint64_t owner) { queue_.push(job_of(kind, owner), now_us_); }
 
   // Runs one job with the cost of its owner in `cost_us`; returns the owner.
   std::uint64_t run(std::map<std::uint64_t, std::int64_t> cost_us, bool ask_again = true) {
@@ -152,14 +153,10 @@ TEST(RenderQueue, BackgroundWaitsForAllOthers) {
 
 TEST(RenderQueue, BackgroundWorkInItsTurnInterruptsNoOtherAndRefusesNobody) {
   RenderQueue queue;
-  RenderJob job;
-  job.kind = RenderKind::background;
-  job.owner = 1;
+  const RenderJob job = job_of(RenderKind::background, 1);
   queue.push(job, 0);
   ASSERT_TRUE(queue.pop());
-  RenderJob turn;
-  turn.kind = RenderKind::request;
-  turn.owner = 2;
+  RenderJob turn = job_of(RenderKind::request, 2);
   turn.payer = "a";
   turn.cost_ms = 1000;
   turn.is_background_turn = true;
@@ -175,16 +172,11 @@ TEST(RenderQueue, BackgroundWorkInItsTurnInterruptsNoOtherAndRefusesNobody) {
 TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     RenderQueue queue;
-    RenderJob job;
-    job.kind = RenderKind::background;
-    job.owner = 1;
+    const RenderJob job = job_of(RenderKind::background, 1);
     queue.push(job, 0);
     ASSERT_TRUE(queue.pop());
     EXPECT_FALSE(job.cancel.cancelled());
-    RenderJob other;
-    other.kind = kind;
-    other.owner = 2;
-    queue.push(other, 0);
+    queue.push(job_of(kind, 2), 0);
     EXPECT_EQ(job.cancel.cancelled(), kind != RenderKind::background);
     queue.done(1);
     const auto next = queue.pop();
@@ -226,16 +218,15 @@ TEST(RenderQueue, NewerBackgroundJobReplacesTheOlderWithNotice) {
 TEST(RenderQueue, CancelledJobDoesNotWaitForItsTurn) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     SCOPED_TRACE(static_cast<int>(kind));
-    Renderer make;
     RenderQueue queue;
-    queue.push(make.job(kind, 1), 0);
+    queue.push(job_of(kind, 1), 0);
     queue.pop();
-    RenderJob second = make.job(kind, 1);
+    RenderJob second = job_of(kind, 1);
     const CancelToken gone = second.cancel;
     queue.push(std::move(second), 0);
     queue.done(100'000);
     for (std::uint64_t newcomer = 2; newcomer < 5; ++newcomer) {
-      queue.push(make.job(RenderKind::stream, newcomer), 0);
+      queue.push(job_of(RenderKind::stream, newcomer), 0);
     }
     EXPECT_EQ(queue.pop()->job.owner, 2U) << "the first owner has used more";
     queue.done(10'000);
