@@ -60,7 +60,7 @@ bool with_allocations(int count, const Body& body) {
   }
 }
 
-RenderJob job_of(RenderKind kind, std::uint64_t owner) {
+RenderJob allocating_job(RenderKind kind, std::uint64_t owner) {
   RenderJob job;
   job.kind = kind;
   job.owner = owner;
@@ -74,8 +74,8 @@ TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
     int failed = 0;
     for (int count = 0;; ++count) {
       RenderQueue queue;
-      queue.push(job_of(kind, 1), 0);
-      RenderJob later = job_of(kind, 2);
+      queue.push(allocating_job(kind, 1), 0);
+      RenderJob later = allocating_job(kind, 2);
       if (with_allocations(count, [&] { queue.push(std::move(later), 0); })) break;
       ++failed;
       const auto first = queue.pop();
@@ -85,7 +85,7 @@ TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
       EXPECT_TRUE(queue.empty());
       EXPECT_FALSE(queue.pop()) << count;
       // A failed job still counts as a turn of its owner.
-      queue.push(job_of(kind, 2), 0);
+      queue.push(allocating_job(kind, 2), 0);
       ASSERT_TRUE(queue.pop());
       queue.done(10);
       EXPECT_TRUE(queue.empty());
@@ -169,13 +169,13 @@ TEST(NoMemory, ThreadsOfServicesContinue) {
   options.charge = [](const std::string&, std::int64_t) { throw std::bad_alloc(); };
   RenderService renderer(options);
   std::promise<void> drawn;
-  RenderJob failing = job_of(RenderKind::request, 1);
+  RenderJob failing = allocating_job(RenderKind::request, 1);
   failing.run = [](std::int64_t /*queue_us*/) {
     allocations_left = 0;
     throw std::bad_alloc();
   };
   EXPECT_TRUE(renderer.submit(std::move(failing)));
-  RenderJob next = job_of(RenderKind::request, 2);
+  RenderJob next = allocating_job(RenderKind::request, 2);
   next.run = [&](std::int64_t /*queue_us*/) { drawn.set_value(); };
   EXPECT_TRUE(renderer.submit(std::move(next)));
   drawn.get_future().wait();
