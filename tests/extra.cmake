@@ -36,7 +36,7 @@ set_tests_properties(toolchain.dropped_call PROPERTIES LABELS unit TIMEOUT 60)
 # Real files against independent readers, and mutated files against a daemon.
 function(windsplat_program_test name)
   add_test(NAME files.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  set_tests_properties(files.${name} PROPERTIES LABELS integration TIMEOUT 300
+  set_tests_properties(files.${name} PROPERTIES LABELS integration TIMEOUT 900
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
@@ -108,7 +108,7 @@ function(windsplat_edge_test name script)
   add_test(NAME edge.${name} COMMAND python3 tests/edge/${script}.py
     --program=$<TARGET_FILE:windsplat> ${edge_options} ${ARGN}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  set_tests_properties(edge.${name} PROPERTIES LABELS integration TIMEOUT 300
+  set_tests_properties(edge.${name} PROPERTIES LABELS integration TIMEOUT 900
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
@@ -123,7 +123,7 @@ endforeach()
 if(NOT WINDSPLAT_SANITIZE)
   add_test(NAME edge.handshakes COMMAND python3 tests/edge/handshakes.py
     --program=$<TARGET_FILE:windsplat> --slack=8 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  set_tests_properties(edge.handshakes PROPERTIES LABELS integration TIMEOUT 300
+  set_tests_properties(edge.handshakes PROPERTIES LABELS integration TIMEOUT 900
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
@@ -164,7 +164,7 @@ endif()
 function(windsplat_fault_test name script)
   add_test(NAME faults.${name} COMMAND python3 tests/faults/${script} ${ARGN}
     --program=$<TARGET_FILE:windsplat> --quick WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  set_tests_properties(faults.${name} PROPERTIES LABELS integration TIMEOUT 600 COST 1000
+  set_tests_properties(faults.${name} PROPERTIES LABELS integration TIMEOUT 1800 COST 1000
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 

@@ -10,8 +10,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -295,30 +297,57 @@ TEST_F(FaultyParts, WholeVolumesAfterPartsAreRefused) {
   expect_violation();
 }
 
+// Files of which `on_answer` is called between an answer of the loader and the count of its memory.
+class WatchedFiles final : public Files {
+ public:
+  WatchedFiles(Location location, std::function<void()> on_answer)
+      : files_(direct_files(std::move(location))), on_answer_(std::move(on_answer)) {}
+  [[nodiscard]] const Location& location() const override { return files_->location(); }
+  Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
+    return files_->open(name);
+  }
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    return files_->list(folder);
+  }
+  bool exists(const std::string& name) override { return files_->exists(name); }
+  std::optional<Error> take_fault() override {
+    on_answer_();
+    return files_->take_fault();
+  }
+
+ private:
+  std::shared_ptr<Files> files_;
+  std::function<void()> on_answer_;
+};
+
 // The memory limit ends the loader once it has answered that it needs the memory of a whole volume.
 TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
-  const std::string second = folder_ / "second";
-  send_parts("if not os.path.exists('" + second + "'):\n" + "    open('" + second +
+  const std::string asked = folder_ / "asked";
+  const std::string grown = folder_ / "grown";
+  send_parts("if not os.path.exists('" + asked + "'):\n    open('" + asked +
              "', 'w').close()\n"
-             "    send('progress', struct.pack('<d', 0.5))\n"
-             "    grown = b'x' * (8 << 20)\n"
              "    send('whole')\n"
+             "    more = b'x' * (8 << 20)\n"
+             "    open('" +
+             grown +
+             "', 'w').close()\n"
              "    receive()\n");
-  auto volume = Result<Volume>(make_error(ErrorKind::out_of_memory, "not read"));
-  // Its memory may be counted before it answers, which is an error.
-  for (int tries = 0; tries < 20; ++tries) {
-    std::filesystem::remove(second);
-    limits_.budget = std::make_shared<Budget>(std::uint64_t{256} << 20);
-    const auto source = opened();
-    ASSERT_TRUE(source) << source.error().message;
-    Reservation others(limits_.budget);
-    (*source)->on_progress([&](double) { EXPECT_TRUE(others.resize(limits_.budget->room())); });
-    volume = (*source)->read(0, 0);
-    EXPECT_TRUE(std::filesystem::exists(second));
-    if (volume || volume.error().kind != ErrorKind::out_of_memory) break;
-  }
+  limits_.budget = std::make_shared<Budget>(std::uint64_t{256} << 20);
+  Reservation others(limits_.budget);
+  const auto fill_memory = [&] {
+    if (!std::filesystem::exists(asked) || others.bytes() > 0) return;
+    while (!std::filesystem::exists(grown)) ::usleep(1000);
+    EXPECT_TRUE(others.resize(limits_.budget->room()));
+  };
+  limits_.files = [&](const Location& location, const std::function<bool()>&) {
+    return std::make_shared<WatchedFiles>(location, fill_memory);
+  };
+  const auto source = opened();
+  ASSERT_TRUE(source) << source.error().message;
+  const auto volume = (*source)->read(0, 0);
   ASSERT_TRUE(volume) << volume.error().message;
   EXPECT_EQ(volume->values.size(), 20 * layer);
+  EXPECT_GT(others.bytes(), 0U);
 }
 
 TEST_F(FaultyParts, LaterChangesOfTheWindowHaveNoEffect) {
