@@ -324,6 +324,7 @@ class WatchedFiles final : public Files {
 TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
   const std::string asked = folder_ / "asked";
   const std::string grown = folder_ / "grown";
+  const std::string again = folder_ / "again";
   send_parts("if not os.path.exists('" + asked + "'):\n    open('" + asked +
              "', 'w').close()\n"
              "    send('whole')\n"
@@ -331,7 +332,9 @@ TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
              "    open('" +
              grown +
              "', 'w').close()\n"
-             "    receive()\n");
+             "    receive()\n"
+             "else:\n    open('" +
+             again + "', 'w').close()\n");
   limits_.budget = std::make_shared<Budget>(std::uint64_t{256} << 20);
   Reservation others(limits_.budget);
   const auto fill_memory = [&] {
@@ -348,6 +351,7 @@ TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
   ASSERT_TRUE(volume) << volume.error().message;
   EXPECT_EQ(volume->values.size(), 20 * layer);
   EXPECT_GT(others.bytes(), 0U);
+  EXPECT_TRUE(std::filesystem::exists(again));
 }
 
 TEST_F(FaultyParts, LaterChangesOfTheWindowHaveNoEffect) {
