@@ -339,7 +339,8 @@ TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
   Reservation others(limits_.budget);
   const auto fill_memory = [&] {
     if (!std::filesystem::exists(asked) || others.bytes() > 0) return;
-    while (!std::filesystem::exists(grown)) ::usleep(1000);
+    for (int ms = 0; ms < 20'000 && !std::filesystem::exists(grown); ++ms) ::usleep(1000);
+    EXPECT_TRUE(std::filesystem::exists(grown));
     EXPECT_TRUE(others.resize(limits_.budget->room()));
   };
   limits_.files = [&](const Location& location, const std::function<bool()>&) {
