@@ -33,7 +33,8 @@ target_compile_options(dropped_call PRIVATE ${kernel_flags})
 add_test(NAME toolchain.dropped_call COMMAND dropped_call)
 set_tests_properties(toolchain.dropped_call PROPERTIES LABELS unit TIMEOUT 60)
 
-# Real files against independent readers, and mutated files against a daemon.
+# Real files against independent readers, and mutated files against a daemon. The limits on time
+# here and below only end what hangs: beside a compile, with a sanitizer, some tests take minutes.
 function(windsplat_program_test name)
   add_test(NAME files.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set_tests_properties(files.${name} PROPERTIES LABELS integration TIMEOUT 900

@@ -172,10 +172,15 @@ class Values(unittest.TestCase):
         histogram = self.dataset.histogram("cloud", bins=8, step=1)
         self.assertEqual(histogram.counts.sum() + histogram.masked, np.prod(self.dataset.shape))
         self.assertEqual((histogram.edges[0], histogram.edges[-1]), (low, high))
-        time = self.dataset.times[1]
-        self.assertEqual(self.dataset.range("cloud", time=time), (low, high))
-        of_time = self.dataset.histogram("cloud", bins=8, time=time)
+        moment = self.dataset.times[1]
+        speeds = [self.dataset.range("wind_speed", step=step) for step in (0, 1)]
+        self.assertNotEqual(*speeds)
+        self.assertNotEqual(speeds[1], self.dataset.range("wind_speed"))
+        self.assertEqual(self.dataset.range("wind_speed", time=moment), speeds[1])
+        of_time = self.dataset.histogram("cloud", bins=8, time=moment)
         np.testing.assert_array_equal(of_time.counts, histogram.counts)
+        first = self.dataset.histogram("cloud", bins=8, step=0)
+        self.assertFalse(np.array_equal(of_time.counts, first.counts))
         every = self.dataset.range("cloud")
         self.assertTrue(every[0] <= low and every[1] >= high)
 

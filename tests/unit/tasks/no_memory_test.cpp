@@ -60,7 +60,7 @@ bool with_allocations(int count, const Body& body) {
   }
 }
 
-// A job that the queue cannot keep without allocating.
+// A job whose copy allocates too, for the name of its payer.
 RenderJob allocating_job(RenderKind kind, std::uint64_t owner) {
   RenderJob job;
   job.kind = kind;

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/files/files.hpp"
 #include "server/data/loader/arriving_volume.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/open/open.hpp"
@@ -297,7 +298,7 @@ TEST_F(FaultyParts, WholeVolumesAfterPartsAreRefused) {
   expect_violation();
 }
 
-// Files of which `on_answer` is called between an answer of the loader and the count of its memory.
+// Local files that call `on_answer` when the loader has answered, before its memory is counted.
 class WatchedFiles final : public Files {
  public:
   WatchedFiles(Location location, std::function<void()> on_answer)
@@ -323,12 +324,18 @@ class WatchedFiles final : public Files {
 // The memory limit ends the loader once it has answered that it needs the memory of a whole volume.
 TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
   const std::string asked = folder_ / "asked";
+  const std::string full = folder_ / "full";
   const std::string grown = folder_ / "grown";
   const std::string again = folder_ / "again";
   send_parts("if not os.path.exists('" + asked + "'):\n    open('" + asked +
              "', 'w').close()\n"
              "    send('whole')\n"
-             "    more = b'x' * (8 << 20)\n"
+             "    for _ in range(2000):\n"
+             "        if os.path.exists('" +
+             full +
+             "'): break\n"
+             "        time.sleep(0.01)\n"
+             "    more = b'x' * (16 << 20)\n"
              "    open('" +
              grown +
              "', 'w').close()\n"
@@ -337,11 +344,14 @@ TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
              again + "', 'w').close()\n");
   limits_.budget = std::make_shared<Budget>(std::uint64_t{256} << 20);
   Reservation others(limits_.budget);
+  // The loader grows once the rest of the memory is taken, so that no earlier count sees it.
   const auto fill_memory = [&] {
     if (!std::filesystem::exists(asked) || others.bytes() > 0) return;
+    constexpr std::uint64_t left = std::uint64_t{4} << 20;
+    EXPECT_TRUE(others.resize(limits_.budget->room() - left));
+    std::ofstream(full).put('x');
     for (int ms = 0; ms < 20'000 && !std::filesystem::exists(grown); ++ms) ::usleep(1000);
     EXPECT_TRUE(std::filesystem::exists(grown));
-    EXPECT_TRUE(others.resize(limits_.budget->room()));
   };
   limits_.files = [&](const Location& location, const std::function<bool()>&) {
     return std::make_shared<WatchedFiles>(location, fill_memory);
