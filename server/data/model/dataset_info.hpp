@@ -66,6 +66,12 @@ struct FieldInfo {
   std::uint64_t decoded_bytes = 0;
   std::uint64_t chunk_bytes = 0;  // the largest chunk, decoded; at least the fields that a derived
                                   // one is computed from, while it is
+  // Samples of a chunk of the file along x, y and z; 1: a box costs its share of the step. 0 along
+  // all axes: the field is not read by boxes. A chunk begins at sample box_chunk_first along each
+  // axis, which is less than its length: chunks of reversed axes count from the other end.
+  std::array<int, 3> box_chunk{0, 0, 0};
+  std::array<int, 3> box_chunk_first{0, 0, 0};
+  [[nodiscard]] bool is_read_by_boxes() const { return box_chunk[0] > 0; }
 };
 
 // A variable of the file that is not shown, with the reason.

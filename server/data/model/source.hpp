@@ -8,6 +8,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/stamp.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/volume.hpp"
 
@@ -24,6 +25,9 @@ class Source {
   [[nodiscard]] virtual const DatasetInfo& info() const = 0;
   // field is an index into info().fields; 0 <= step < info().steps.size().
   virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
+  // A box of them, masked as by read(), with its own range. Reads the whole of fields that are not
+  // read by boxes (FieldInfo::box_chunk). Errors: those of read(); invalid: a box beyond the grid.
+  virtual Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box);
   // May be called from any thread: a running read ends soon with the error cancelled, if the source
   // supports this.
   virtual void cancel() {}
@@ -35,6 +39,8 @@ class Source {
   virtual void on_progress(Progress progress) { progress_ = std::move(progress); }
 
  protected:
+  // Errors: invalid.
+  [[nodiscard]] Result<void> check_box(const Box& box) const;
   void report_progress(double done) const {
     if (progress_) progress_(done);
   }
@@ -75,8 +81,15 @@ class FileSource : public Source {
                                      PartTaker& /*taker*/) {
     return false;
   }
+  // Reads a box of all components, as fill() reads the whole; `out` contains zeros. False: the
+  // field has to be read as a whole.
+  virtual Result<bool> fill_part(std::size_t /*field*/, std::size_t /*step*/, const Box& /*box*/,
+                                 float* /*out*/) {
+    return false;
+  }
   // fill(), then finish_volume().
   Result<Volume> read(std::size_t field, std::size_t step) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
 };
 
 }  // namespace windsplat::data
