@@ -2,6 +2,7 @@
 #include "server/data/cf/read_blocks.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <type_traits>
 #include <vector>
 
@@ -110,11 +111,18 @@ std::vector<std::size_t> block_counts(const std::vector<Way>& ways,
   return count;
 }
 
+// All samples of those levels.
+Box box_of(const Placement& grid, const Levels& levels) {
+  return {{0, 0, static_cast<int>(levels.first)},
+          {static_cast<int>(grid.length[0]), static_cast<int>(grid.length[1]),
+           static_cast<int>(levels.count)}};
+}
+
 // Mapping of each dimension of a variable; sets `origin` to the offset of the first value.
 std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int variable,
-                         std::size_t step, const Levels& levels, std::ptrdiff_t& origin) {
-  const std::array<std::ptrdiff_t, 3> strides{1, static_cast<std::ptrdiff_t>(grid.length[0]),
-                                              static_cast<std::ptrdiff_t>(grid.layer())};
+                         std::size_t step, const Box& box, std::ptrdiff_t& origin) {
+  const std::ptrdiff_t row = box.count[0];
+  const std::array<std::ptrdiff_t, 3> strides{1, row, row * box.count[1]};
   std::vector<Way> ways;
   origin = 0;
   for (const int id : file.contents().variables.at(static_cast<std::size_t>(variable)).dims) {
@@ -123,10 +131,9 @@ std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int varia
     if (at != grid.space.end()) {
       const auto axis = static_cast<std::size_t>(at - grid.space.begin());
       const bool turned = grid.turned.at(axis);
-      way.length = axis == 2 ? levels.count : grid.length.at(axis);
-      if (axis == 2) {
-        way.first = turned ? grid.length[2] - levels.first - levels.count : levels.first;
-      }
+      const auto first = static_cast<std::size_t>(box.first.at(axis));
+      way.length = static_cast<std::size_t>(box.count.at(axis));
+      way.first = turned ? grid.length.at(axis) - first - way.length : first;
       way.stride = strides.at(axis);
       if (turned) {
         origin += static_cast<std::ptrdiff_t>(way.length - 1) * way.stride;
@@ -149,23 +156,29 @@ struct Walk {
 };
 
 Walk block_at(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
-              const std::vector<std::size_t>& index, std::ptrdiff_t origin) {
+              const std::vector<std::size_t>& chunk, const std::vector<std::size_t>& index,
+              std::ptrdiff_t origin) {
   Walk walk;
   walk.corner = origin;
   for (std::size_t d = 0; d < ways.size(); ++d) {
-    walk.start.push_back(ways[d].first + index[d]);
-    walk.count.push_back(std::min(block[d], ways[d].length - index[d]));
+    const std::size_t start = ways[d].first + index[d];
+    std::size_t count = std::min(block[d], ways[d].length - index[d]);
+    // A block that ends within the range ends with a chunk, so that none is decoded twice.
+    const std::size_t beyond = (start + count) % chunk[d];
+    if (count < ways[d].length - index[d] && beyond < count) count -= beyond;
+    walk.start.push_back(start);
+    walk.count.push_back(count);
     walk.corner += static_cast<std::ptrdiff_t>(index[d]) * ways[d].stride;
     walk.values *= walk.count[d];
   }
   return walk;
 }
 
-// Advances to the next block; false after the last.
-bool advance(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
+// Advances from a block of those counts to the next; false after the last.
+bool advance(const std::vector<Way>& ways, const std::vector<std::size_t>& count,
              std::vector<std::size_t>& index) {
   for (std::size_t d = ways.size(); d > 0; --d) {
-    index[d - 1] += block[d - 1];
+    index[d - 1] += count[d - 1];
     if (index[d - 1] < ways[d - 1].length) return true;
     index[d - 1] = 0;
   }
@@ -177,14 +190,16 @@ template <class T, class Rule>
 Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<Way>& ways,
                          std::ptrdiff_t origin, const Rule& rule, float* out,
                          const Progress& tell) {
-  const std::vector<std::size_t> block = block_counts(ways, file.chunk(variable));
+  const std::vector<std::size_t> chunk = file.chunk(variable);
+  const std::vector<std::size_t> block = block_counts(ways, chunk);
   std::size_t all = 1;
   for (const Way& way : ways) all *= way.length;
   std::vector<T> buffer;
   std::size_t done = 0;
   std::vector<std::size_t> index(ways.size(), 0);  // index in the block, relative to `first`
-  do {
-    const Walk walk = block_at(ways, block, index, origin);
+  bool is_last = false;
+  while (!is_last) {
+    const Walk walk = block_at(ways, block, chunk, index, origin);
     bool in_place = false;
     if constexpr (std::is_same_v<T, float>) {
       in_place = in_one_piece(walk.count, ways);
@@ -204,7 +219,8 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
     }
     done += walk.values;
     tell(static_cast<double>(done) / static_cast<double>(all));
-  } while (advance(ways, block, index));
+    is_last = !advance(ways, walk.count, index);
+  }
   return {};
 }
 
@@ -250,6 +266,47 @@ std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, in
   return out;
 }
 
+void mask_columns(const std::vector<bool>& columns, const Box& box, std::size_t width,
+                  float* values) {
+  if (columns.empty()) return;
+  const auto [columns_x, rows, layers] = box.count;
+  const auto row = static_cast<std::size_t>(columns_x);
+  for (int j = 0; j < rows; ++j) {
+    const std::size_t first =
+        static_cast<std::size_t>(box.first[1] + j) * width + static_cast<std::size_t>(box.first[0]);
+    for (std::size_t i = 0; i < row; ++i) {
+      if (!columns[first + i]) continue;
+      for (int k = 0; k < layers; ++k) {
+        const auto at = static_cast<std::size_t>(k) * static_cast<std::size_t>(rows) +
+                        static_cast<std::size_t>(j);
+        values[at * row + i] = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+}
+
+BoxChunk box_chunk(const ArrayFile& file, const Placement& grid,
+                   const std::vector<int>& variables) {
+  BoxChunk out;
+  for (const int variable : variables) {
+    const FileVariable& about = file.contents().variables.at(at(variable));
+    const std::vector<std::size_t> chunk = file.chunk(variable);
+    BoxChunk own{{1, 1, 1}, {0, 0, 0}};
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (grid.space.at(a) < 0) continue;
+      const auto place = std::find(about.dims.begin(), about.dims.end(), grid.space.at(a));
+      if (place == about.dims.end() || !about.layers_apart) return {};
+      const std::size_t all = grid.length.at(a);
+      const std::size_t length =
+          std::min(chunk[static_cast<std::size_t>(place - about.dims.begin())], all);
+      own.length.at(a) = static_cast<int>(length);
+      own.first.at(a) = static_cast<int>(grid.turned.at(a) ? all % length : 0);
+    }
+    if (out.length[0] == 0) out = own;
+  }
+  return out;
+}
+
 void multiply(double factor, std::size_t count, float* values) {
   if (factor == 1) return;
   for (std::size_t n = 0; n < count; ++n) {
@@ -263,7 +320,7 @@ double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int vari
   std::vector<std::size_t> start;
   std::vector<std::size_t> count;
   double volume = sizeof(float);
-  for (const Way& way : ways_of(file, grid, variable, 0, levels, origin)) {
+  for (const Way& way : ways_of(file, grid, variable, 0, box_of(grid, levels), origin)) {
     start.push_back(way.first);
     count.push_back(way.length);
     volume *= static_cast<double>(way.length);
@@ -273,8 +330,13 @@ double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int vari
 
 Result<void> read_levels(const ArrayFile& file, const Placement& grid, int variable,
                          std::size_t step, const Levels& levels, float* out, const Progress& tell) {
+  return read_box(file, grid, variable, step, box_of(grid, levels), out, tell);
+}
+
+Result<void> read_box(const ArrayFile& file, const Placement& grid, int variable, std::size_t step,
+                      const Box& box, float* out, const Progress& tell) {
   std::ptrdiff_t origin = 0;
-  const std::vector<Way> ways = ways_of(file, grid, variable, step, levels, origin);
+  const std::vector<Way> ways = ways_of(file, grid, variable, step, box, origin);
   const Packing packing = packing_of(file, variable);
   const auto mask = float_mask(packing);
   const auto& type = file.contents().variables.at(static_cast<std::size_t>(variable)).type;

@@ -8,6 +8,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/source.hpp"
 
 namespace windsplat::data::cf {
@@ -31,6 +32,22 @@ struct Levels {
 // one for a variable without levels. Calls `tell` with the fraction done. Errors: bad_data.
 Result<void> read_levels(const ArrayFile& file, const Placement& grid, int variable,
                          std::size_t step, const Levels& levels, float* out, const Progress& tell);
+// The same of the samples of a box.
+Result<void> read_box(const ArrayFile& file, const Placement& grid, int variable, std::size_t step,
+                      const Box& box, float* out, const Progress& tell);
+
+// Masks columns, x fastest in rows of `width`, in the values of a box of samples. Empty: none.
+void mask_columns(const std::vector<bool>& columns, const Box& box, std::size_t width,
+                  float* values);
+
+// FieldInfo::box_chunk and box_chunk_first of the components of a field: those of the first.
+struct BoxChunk {
+  std::array<int, 3> length{0, 0, 0};
+  std::array<int, 3> first{0, 0, 0};
+};
+// Lengths of 0 if one of them lacks a dimension of the grid, or is not read by layers.
+BoxChunk box_chunk(const ArrayFile& file, const Placement& grid, const std::vector<int>& variables);
+
 // Frees the chunks that the file keeps of a variable, unless they contain other steps, which are
 // likely to be read next. For use after all levels of a step have been read.
 void forget_step(const ArrayFile& file, const Placement& grid, int variable);

@@ -50,9 +50,7 @@ class ArraySource final : public FileSource {
   Result<void> prepare(const std::string& title) {
     roles_ = classify_dimensions(file_->contents());
     auto choice = choose_grid(file_->contents(), roles_);
-    if (!choice) {
-      return named(choice.error());
-    }
+    if (!choice) return named(choice.error());
     choice_ = std::move(*choice);
     if (auto fine = check_entries(); !fine) {
       return named(fine.error());
@@ -69,15 +67,11 @@ class ArraySource final : public FileSource {
       return named(done.error());
     }
     auto pressures = find_pressures(*file_, coordinate_of(choice_.space[2]), placement_, info_);
-    if (!pressures) {
-      return named(pressures.error());
-    }
+    if (!pressures) return named(pressures.error());
     pressures_ = std::move(*pressures);
     auto heights =
         find_heights(*file_, coordinate_of(choice_.space[2]), choice_.variables, placement_, info_);
-    if (!heights) {
-      return named(heights.error());
-    }
+    if (!heights) return named(heights.error());
     heights_ = std::move(*heights);
     find_ground(*file_, heights_, placement_, info_);
     if (auto done = find_fields(); !done) {
@@ -86,9 +80,10 @@ class ArraySource final : public FileSource {
     if (info_.fields.empty()) {
       return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
     }
-    tell_absent_components();
-    for (std::string note : {valid_values_note(*file_, choice_.variables),
-                             unwritten_note(*file_, choice_.variables)}) {
+    for (std::string note :
+         {absent_components_note(file_->contents(), info_.left_out, choice_.variables),
+          valid_values_note(*file_, choice_.variables),
+          unwritten_note(*file_, choice_.variables)}) {
       if (!note.empty()) info_.notes.push_back(std::move(note));
     }
     bound_notes(notes_of_file, info_.notes);
@@ -132,7 +127,8 @@ class ArraySource final : public FileSource {
       rotate(*bearing_, placement_.length[2], out, out + samples);
     }
     if (plan.follows_rows) follow_axes(out, out + samples);
-    mask_outside(out, placement_.length[2] * info_.fields[field].components.size());
+    mask_columns(outside_, layers(placement_.length[2] * info_.fields[field].components.size()),
+                 placement_.length[0], out);
     return {};
   }
 
@@ -159,11 +155,27 @@ class ArraySource final : public FileSource {
           return read.error();
         }
         multiply(plan.factors[c], levels.count * placement_.layer(), out);
-        mask_outside(out, levels.count);
+        mask_columns(outside_, layers(levels.count), placement_.length[0], out);
         taker.take({c, levels.first, levels.count});
         done += levels.count;
       }
       forget_step(*file_, placement_, plan.variables[c]);
+    }
+    return true;
+  }
+
+  Result<bool> fill_part(std::size_t field, std::size_t step, const Box& box, float* out) override {
+    WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size());
+    if (!info_.fields[field].is_read_by_boxes()) return false;
+    const Plan& plan = plans_[field];
+    for (std::size_t c = 0; c < plan.variables.size(); ++c) {
+      const int v = plan.variables[c];
+      float* const values = out + c * box.samples();
+      auto read = read_box(*file_, placement_, v, step, box, values, [](double) {});
+      if (!read) return read.error();
+      forget_step(*file_, placement_, v);
+      multiply(plan.factors[c], box.samples(), values);
+      mask_columns(outside_, box, placement_.length[0], values);
     }
     return true;
   }
@@ -266,6 +278,12 @@ class ArraySource final : public FileSource {
   }
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
+  // A box of so many whole layers.
+  [[nodiscard]] Box layers(std::size_t count) const {
+    Box out = whole_box(info_.grid.dims());
+    out.count[2] = static_cast<int>(count);
+    return out;
+  }
 
   // Creates the axis of a missing dimension, with one sample.
   [[nodiscard]] Axis flat_axis(std::size_t which) const {
@@ -366,19 +384,6 @@ class ArraySource final : public FileSource {
     return {};
   }
 
-  // A velocity that is not shown, or only in part, must not go unnoticed.
-  void tell_absent_components() {
-    std::string text;
-    for (const LeftOut& left : info_.left_out) {
-      const int v = variable_named(file_->contents(), left.name);
-      if (v < 0 || !is_velocity_component(file_->contents().variables[at(v)])) continue;
-      const auto& shown = choice_.variables;
-      if (std::find(shown.begin(), shown.end(), v) != shown.end()) continue;  // of another file
-      text += (text.empty() ? "" : "; ") + in_quotes(left.name) + ": " + left.reason;
-    }
-    if (!text.empty()) info_.notes.push_back("components of a velocity are not shown: " + text);
-  }
-
   [[nodiscard]] bool is_ocean_level(int coordinate) const {
     return coordinate >= 0 &&
            file_->contents().variables.at(at(coordinate)).standard_name.starts_with("ocean_");
@@ -398,6 +403,11 @@ class ArraySource final : public FileSource {
     }
     info.decoded_bytes = static_cast<std::uint64_t>(std::min(decoded, 0x1p62));
     info.chunk_bytes = static_cast<std::uint64_t>(std::min(chunk, 0x1p62));
+    if (plan.derived < 0 && !plan.rotated && !plan.follows_rows) {
+      const BoxChunk stored = box_chunk(*file_, placement_, plan.variables);
+      info.box_chunk = stored.length;
+      info.box_chunk_first = stored.first;
+    }
     info_.fields.push_back(std::move(info));
     plans_.push_back(std::move(plan));
   }
@@ -438,16 +448,6 @@ class ArraySource final : public FileSource {
       if (to_axes_.swapped) std::swap(x[n], y[n]);
       if (to_axes_.negated[0]) x[n] = -x[n];
       if (to_axes_.negated[1]) y[n] = -y[n];
-    }
-  }
-
-  // A part of the picture of a satellite that does not show the Earth has no position.
-  void mask_outside(float* values, std::size_t layers) const {
-    for (std::size_t n = 0; n < outside_.size(); ++n) {
-      if (!outside_[n]) continue;
-      for (std::size_t k = 0; k < layers; ++k) {
-        values[k * outside_.size() + n] = std::numeric_limits<float>::quiet_NaN();
-      }
     }
   }
 

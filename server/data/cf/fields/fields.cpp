@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/array_file.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
@@ -448,6 +449,20 @@ void tell_unnamed_components(const FileContents& contents, const std::vector<Fie
 }
 
 }  // namespace
+
+std::string absent_components_note(const FileContents& contents,
+                                   const std::vector<LeftOut>& left_out,
+                                   const std::vector<int>& shown) {
+  std::string text;
+  for (const LeftOut& left : left_out) {
+    const int v = variable_named(contents, left.name);
+    if (v < 0 || !is_velocity_component(contents.variables[at(v)])) continue;
+    if (std::find(shown.begin(), shown.end(), v) != shown.end()) continue;
+    text += (text.empty() ? "components of a velocity are not shown: " : "; ") +
+            in_quotes(left.name) + ": " + left.reason;
+  }
+  return text;
+}
 
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
                                    AxisKind vertical, std::vector<std::string>& notes) {

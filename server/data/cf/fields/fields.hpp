@@ -23,6 +23,13 @@ bool has_velocity_name(const FileVariable& variable);
 // Whether a variable is by its name and units a component of a velocity.
 bool is_velocity_component(const FileVariable& variable);
 
+// Which components of velocities were left out, as a note; empty: none. A velocity that is not
+// shown, or only in part, must not go unnoticed. shown: variables, one of which may have the name
+// of one that was left out of another file.
+std::string absent_components_note(const FileContents& contents,
+                                   const std::vector<LeftOut>& left_out,
+                                   const std::vector<int>& shown);
+
 // variables: those on the chosen grid. vertical: the kind of its z axis (with a depth axis, u and v
 // are a current). Components are identified by the attribute of the netCDF writer, then by
 // standard_name (eastward_, northward_, upward_...), then by common names (u v w, ua va wap, ugrd

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -27,6 +28,7 @@ struct ChunkLog {
   std::set<std::pair<int, Lengths>> kept;
   int variable = -1;  // the only one that is counted
   int decoded = 0;
+  int touched = 0;  // by all reads, kept or not
   int forgotten = 0;
 };
 
@@ -73,6 +75,7 @@ class ClaimedChunks final : public cf::ArrayFile {
     for (std::size_t k = start[0] / chunk_[0]; k <= last(0); ++k) {
       for (std::size_t j = start[1] / chunk_[1]; j <= last(1); ++j) {
         for (std::size_t i = start[2] / chunk_[2]; i <= last(2); ++i) {
+          ++log_.touched;
           log_.decoded += log_.kept.insert({variable, {k, j, i}}).second ? 1 : 0;
         }
       }
@@ -180,6 +183,24 @@ TEST_F(LevelParts, ChunksAreDecodedOnceForBothDirectionsOfTheLevels) {
     EXPECT_EQ(collected.values, whole);
     EXPECT_EQ(whole[0], falls ? 7 * 32 * 32 : 0);
   }
+}
+
+// More than 2^22 samples, which are read in several blocks; the box begins and ends within chunks.
+TEST_F(LevelParts, BlocksOfABoxEndWithChunks) {
+  std::vector<double> z(80);
+  std::iota(z.begin(), z.end(), 0.0);
+  const auto file = file_of(z, 256, {24, 64, 256});
+  const auto& dims = file->contents().variables.at(cf::at(log_.variable)).dims;
+  cf::Placement grid;
+  grid.space = {dims[2], dims[1], dims[0]};
+  grid.length = {256, 256, 80};
+  const Box box{{3, 1, 5}, {250, 255, 70}};
+  std::vector<float> values(box.samples());
+  const auto done = cf::read_box(*file, grid, log_.variable, 0, box, values.data(), [](double) {});
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(log_.touched, 4 * 4);
+  EXPECT_EQ(values.front(), 5 * 65536 + 256 + 3);
+  EXPECT_EQ(values.back(), 74 * 65536 + 255 * 256 + 252);
 }
 
 }  // namespace
