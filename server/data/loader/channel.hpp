@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 enum class Kind : std::uint32_t {
   // daemon -> loader: what to do
   open = 1,  // settings and location -> opened or failed
-  read,      // field, step; with the memory to fill -> filled, whole or failed
+  read,      // field, step, box; with the memory to fill -> filled, whole or failed
   // daemon -> loader: answers to requests of the loader
   descriptor,  // answer: success, with a descriptor; of a file in parts its number and state
   names,

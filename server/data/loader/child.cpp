@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -116,26 +117,17 @@ auto guarded(const Work& work) -> decltype(work()) {
   }
 }
 
-// What a message asks for.
-struct Wanted {
-  std::size_t field = 0;
-  std::size_t step = 0;
-  std::size_t window_layers = 0;  // in parts through a window with halves of so many; 0: as a whole
-  bool is_fresh = false;          // the memory has not been written to yet
-};
-
-// false: it cannot be read in parts.
-Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memory) {
+// Fills the memory with what is asked for. false: it cannot be read in parts. `is_fresh`: the
+// memory has not been written to yet.
+Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memory, bool is_fresh) {
   const DatasetInfo& info = source.info();
-  if (wanted.field >= info.fields.size() || wanted.step >= info.steps.size()) {
-    return make_error(ErrorKind::internal, "no such field or step");
-  }
+  const std::array<int, 3> dims = info.grid.dims();
   const std::size_t components = info.fields[wanted.field].components.size();
-  const std::size_t samples = info.grid.samples();
-  const std::size_t layer = samples / info.grid.axes[2].coordinates.size();
+  const std::size_t samples = wanted.box.samples();
+  const std::size_t layer = info.grid.samples() / info.grid.axes[2].coordinates.size();
   const std::size_t floats =
       wanted.window_layers > 0 ? 2 * layer * wanted.window_layers : samples * components;
-  if (wanted.window_layers > samples || floats > memory.floats()) {
+  if (wanted.window_layers > info.grid.samples() || floats > memory.floats()) {
     return make_error(ErrorKind::internal, "the memory of a volume has the wrong size");
   }
   if (wanted.window_layers > 0) {
@@ -145,9 +137,13 @@ Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memor
     return done;
   }
   // Overwrites numbers of the previous volume.
-  if (!wanted.is_fresh) std::fill_n(memory.data(), floats, 0.0F);
-  if (auto done = source.fill(wanted.field, wanted.step, memory.data()); !done) {
-    return done.error();
+  if (!is_fresh) std::fill_n(memory.data(), floats, 0.0F);
+  if (wanted.box == whole_box(dims)) {
+    auto done = source.fill(wanted.field, wanted.step, memory.data());
+    if (!done) return done.error();
+  } else {
+    auto done = source.fill_part(wanted.field, wanted.step, wanted.box, memory.data());
+    if (!done || !*done) return done;
   }
   mask_volume(memory.data(), samples, static_cast<int>(components));
   return true;
@@ -195,26 +191,22 @@ class Loader {
   }
 
   void read(Message& message) {
-    Reader in(message.payload);
-    Wanted wanted;
-    wanted.field = static_cast<std::size_t>(in.number<std::uint64_t>());
-    wanted.step = static_cast<std::size_t>(in.number<std::uint64_t>());
-    const bool keeps_memory = in.number<std::uint64_t>() != 0;
-    wanted.window_layers = static_cast<std::size_t>(in.number<std::uint64_t>());
-    if (!source_ || !in.complete()) leave();
+    if (!source_) leave();
+    const auto wanted = decode_wanted(message.payload, source_->info());
     told_ = Clock::now();
     const auto done = guarded([&]() -> Result<bool> {
-      if (message.descriptor) {
+      if (!wanted) return wanted.error();
+      const bool is_fresh = static_cast<bool>(message.descriptor);
+      if (is_fresh) {
         memory_ = Mapping();
         auto mapped = Mapping::of(message.descriptor, true);
         message.descriptor.reset();
         if (!mapped) return mapped.error();
         memory_ = std::move(*mapped);
-        wanted.is_fresh = true;
       }
-      return fill(*source_, wanted, memory_);
+      return fill(*source_, *wanted, memory_, is_fresh);
     });
-    if (!keeps_memory) memory_ = Mapping();
+    if (!wanted || !wanted->keeps_memory) memory_ = Mapping();
     if (!done) {
       say(Kind::failed, encode_error(done.error()));
     } else {

@@ -69,6 +69,7 @@ class RemoteSource : public Source {
   // an invalid message, or if the files changed since opening; out_of_memory if the limit leaves
   // too little for the loader; cancelled.
   Result<Volume> read(std::size_t field, std::size_t step) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
 
   // Called during reads, on the reading thread, about every 50 ms.
   void on_progress(Progress progress) override;
@@ -89,6 +90,8 @@ class RemoteSource : public Source {
                                                     const CancelToken& cancel);
   struct State;
   explicit RemoteSource(std::unique_ptr<State> state);
+  template <class Read>
+  Result<Volume> run(std::size_t field, std::size_t step, const Read& read);
   std::unique_ptr<State> state_;
 };
 

@@ -92,7 +92,21 @@ Grid grid_of(Reader& in) {
   return grid;
 }
 
-FieldInfo field_of(Reader& in, std::uint64_t samples) {
+// Both along all axes, or neither.
+void chunks_of(Reader& in, const std::array<int, 3>& dims, FieldInfo& field) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    field.box_chunk.at(a) = in.number<std::int32_t>();
+    field.box_chunk_first.at(a) = in.number<std::int32_t>();
+    const int length = field.box_chunk.at(a);
+    const int first = field.box_chunk_first.at(a);
+    const bool is_chunk = length > 0 && length <= dims.at(a) && first >= 0 && first < length;
+    const bool is_none = length == 0 && first == 0;
+    if (!is_chunk && !is_none) in.fail();
+    if ((length > 0) != (field.box_chunk[0] > 0)) in.fail();
+  }
+}
+
+FieldInfo field_of(Reader& in, const std::array<int, 3>& dims, std::uint64_t samples) {
   FieldInfo field;
   field.name = text_of(in);
   const auto kind = in.number<std::uint8_t>();
@@ -107,6 +121,7 @@ FieldInfo field_of(Reader& in, std::uint64_t samples) {
   field.derived = derived == 1;
   field.decoded_bytes = in.number<std::uint64_t>();
   field.chunk_bytes = in.number<std::uint64_t>();
+  chunks_of(in, dims, field);
   const std::size_t count = field.components.size();
   const bool right_count = kind == 0 ? count == 1 : count == 2 || count == 3;
   if (kind > 1 || derived > 1 || !right_count || field.component_units.size() != count ||
@@ -159,6 +174,10 @@ void put_field(Writer& out, const FieldInfo& field) {
   out.number(static_cast<std::uint8_t>(field.derived ? 1 : 0));
   out.number(field.decoded_bytes);
   out.number(field.chunk_bytes);
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.number(static_cast<std::int32_t>(field.box_chunk.at(a)));
+    out.number(static_cast<std::int32_t>(field.box_chunk_first.at(a)));
+  }
 }
 
 Error malformed(const char* what) {
@@ -214,6 +233,37 @@ Result<Task> decode_task(std::string_view bytes) {
   for (Location::Member& member : out.location.members) member.name = in.text(text_max);
   if (!in.complete()) return make_error(ErrorKind::internal, "the task of the loader is malformed");
   return out;
+}
+
+std::string encode_wanted(const Wanted& wanted) {
+  Writer out;
+  out.number(wanted.field);
+  out.number(wanted.step);
+  for (const auto& three : {wanted.box.first, wanted.box.count}) {
+    for (const int n : three) out.number(static_cast<std::int32_t>(n));
+  }
+  out.number(wanted.window_layers);
+  out.number(static_cast<std::uint8_t>(wanted.keeps_memory ? 1 : 0));
+  return out.take();
+}
+
+Result<Wanted> decode_wanted(std::string_view bytes, const DatasetInfo& info) {
+  Reader in(bytes);
+  Wanted out;
+  out.field = in.number<std::uint64_t>();
+  out.step = in.number<std::uint64_t>();
+  for (auto* three : {&out.box.first, &out.box.count}) {
+    for (int& n : *three) n = in.number<std::int32_t>();
+  }
+  out.window_layers = in.number<std::uint64_t>();
+  out.keeps_memory = in.number<std::uint8_t>() != 0;
+  const bool is_whole = out.box == whole_box(info.grid.dims());
+  if (in.complete() && out.field < info.fields.size() && out.step < info.steps.size() &&
+      is_within(out.box, info.grid.dims()) && (is_whole || out.window_layers == 0) &&
+      (is_whole || info.fields[out.field].is_read_by_boxes())) {
+    return out;
+  }
+  return make_error(ErrorKind::internal, "no such field, step or box");
 }
 
 std::string encode_error(const Error& error) {
@@ -290,7 +340,7 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
   const std::uint64_t samples = in.sound() ? info.grid.samples() : 0;
   info.fields.resize(in.count(things_max, text_bytes_min));
   for (FieldInfo& field : info.fields) {
-    field = field_of(in, samples);
+    field = field_of(in, info.grid.dims(), samples);
     if (!in.sound()) break;
   }
   info.left_out.resize(in.count(things_max, 2 * text_bytes_min));

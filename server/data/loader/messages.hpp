@@ -9,6 +9,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::loader {
@@ -25,6 +26,19 @@ struct Task {
 
 std::string encode_task(const Task& task);
 Result<Task> decode_task(std::string_view bytes);
+
+// What Kind::read asks for.
+struct Wanted {
+  std::uint64_t field = 0;
+  std::uint64_t step = 0;
+  Box box;
+  // In parts through a window with halves of so many layers, of the whole only; 0: at once.
+  std::uint64_t window_layers = 0;
+  bool keeps_memory = false;  // for the next volume
+};
+std::string encode_wanted(const Wanted& wanted);
+// Errors: internal if it is malformed, or not of the dataset: field, step, box.
+Result<Wanted> decode_wanted(std::string_view bytes, const DatasetInfo& info);
 
 std::string encode_error(const Error& error);
 // Decodes any bytes: the result is an error of a kind that readers return, with a printable

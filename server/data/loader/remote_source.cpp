@@ -7,7 +7,6 @@
 
 #include "server/base/check.hpp"
 #include "server/data/loader/arriving_volume.hpp"
-#include "server/data/loader/bytes.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/loader/running_loader.hpp"
 #include "server/data/loader/transfer.hpp"
@@ -28,20 +27,12 @@ Error wrong(const DatasetInfo& info, const std::string& how, const RunningLoader
                     "the loader of " + in_quotes(info.source) + ' ' + how + " while " + what.doing);
 }
 
-// Asks for a field at a step, in parts through a window with halves of so many layers (0: as a
-// whole), whose memory is kept for the next volume or not.
-RunningLoader::Call call_for(const DatasetInfo& info, std::size_t field, std::size_t step,
-                             std::size_t window_layers, bool is_kept) {
-  Writer out;
-  out.number(static_cast<std::uint64_t>(field));
-  out.number(static_cast<std::uint64_t>(step));
-  out.number(static_cast<std::uint64_t>(is_kept ? 1 : 0));
-  out.number(static_cast<std::uint64_t>(window_layers));
+RunningLoader::Call call_for(const DatasetInfo& info, const Wanted& wanted) {
   RunningLoader::Call what;
   what.kind = Kind::read;
-  what.payload = out.take();
+  what.payload = encode_wanted(wanted);
   what.answer = Kind::filled;
-  what.doing = "reading " + in_quotes(info.fields[field].name);
+  what.doing = "reading " + in_quotes(info.fields[wanted.field].name);
   return what;
 }
 
@@ -136,14 +127,15 @@ struct RemoteSource::State {
     return static_cast<bool>(transfer_memory.resize(bytes, Urgency::prefetch));
   }
 
-  Result<Volume> read(std::size_t field, std::size_t step) {
+  Result<Volume> read(std::size_t field, std::size_t step, const Box& box) {
     if (auto ready = be_ready(); !ready) return ready.error();
     const FieldInfo& about = info.fields[field];
     Volume volume;
-    volume.dims = info.grid.dims();
+    volume.dims = box.count;
     volume.components = static_cast<int>(about.components.size());
     const WindowSize window = window_size(volume);
-    if (window.layers > 0 && wholes.count(field) == 0 && is_there(window)) {
+    const bool is_whole = box == whole_box(info.grid.dims());
+    if (is_whole && window.layers > 0 && wholes.count(field) == 0 && is_there(window)) {
       auto done = read_in_parts(field, step, window, volume);
       if (!done) return done.error();
       if (*done) return volume;
@@ -151,7 +143,7 @@ struct RemoteSource::State {
       // The loader's memory may have exceeded the limit meanwhile.
       if (auto ready = be_ready(); !ready) return ready.error();
     }
-    if (auto done = read_whole(field, step, volume); !done) return done.error();
+    if (auto done = read_at_once(field, step, box, volume); !done) return done.error();
     return volume;
   }
 
@@ -173,7 +165,8 @@ struct RemoteSource::State {
       if (!made) return made.error();
       transfer = std::move(*made);
     }
-    RunningLoader::Call what = call_for(info, field, step, window.layers, true);
+    RunningLoader::Call what =
+        call_for(info, {field, step, whole_box(volume.dims), window.layers, true});
     what.time = time_to_read(limits, values_of(volume) * sizeof(float));
     if (is_new) what.descriptor = transfer->descriptor();
     ArrivingVolume arriving(volume, window, transfer->values());
@@ -195,7 +188,8 @@ struct RemoteSource::State {
     return wrong(info, is_complete ? invalid_numbers : "sent an incomplete volume", what);
   }
 
-  Result<void> read_whole(std::size_t field, std::size_t step, Volume& volume) {
+  // The samples of a box, in one piece.
+  Result<void> read_at_once(std::size_t field, std::size_t step, const Box& box, Volume& volume) {
     const std::size_t floats = values_of(volume);
     const bool is_new = !transfer || transfer->floats() < floats;
     if (is_new) {
@@ -204,8 +198,10 @@ struct RemoteSource::State {
       if (!made) return made.error();
       transfer = std::move(*made);
     }
-    RunningLoader::Call what = call_for(info, field, step, 0, transfer->is_kept());
-    what.time = time_to_read(limits, floats * sizeof(float));
+    RunningLoader::Call what = call_for(info, {field, step, box, 0, transfer->is_kept()});
+    // A box may be decoded from chunks of the whole step.
+    const std::size_t components = info.fields[field].components.size();
+    what.time = time_to_read(limits, info.grid.samples() * components * sizeof(float));
     if (is_new) what.descriptor = transfer->descriptor();
     if (auto done = loader.call(what); !done) {
       if (loader.is_released()) drop_transfer();  // has ended
@@ -232,14 +228,25 @@ RemoteSource::~RemoteSource() = default;
 
 const DatasetInfo& RemoteSource::info() const { return state_->info; }
 
-Result<Volume> RemoteSource::read(std::size_t field, std::size_t step) {
+template <class Read>
+Result<Volume> RemoteSource::run(std::size_t field, std::size_t step, const Read& read) {
   WINDSPLAT_CHECK(field < info().fields.size() && step < info().steps.size());
   state_->begin();
-  auto out = state_->read(field, step);
+  auto out = read();
   if (!state_->finish()) return out;
   state_->release();
   return make_error(ErrorKind::cancelled, "reading " + in_quotes(info().fields[field].name) +
                                               " of " + in_quotes(info().source) + " was cancelled");
+}
+
+Result<Volume> RemoteSource::read(std::size_t field, std::size_t step) {
+  return run(field, step, [&] { return state_->read(field, step, whole_box(info().grid.dims())); });
+}
+
+Result<Volume> RemoteSource::read_part(std::size_t field, std::size_t step, const Box& box) {
+  if (auto fine = check_box(box); !fine) return fine.error();
+  if (!info().fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, box);
+  return run(field, step, [&] { return state_->read(field, step, box); });
 }
 
 void RemoteSource::on_progress(Progress progress) {

@@ -225,5 +225,70 @@ TEST_F(FaultyLoader, InfinitiesAndIncompleteVectorsAreRefused) {
   }
 }
 
+// A box of 1 x 2 x 1 samples of the vector.
+class FaultyBoxes : public FaultyLoader {
+ protected:
+  void SetUp() override {
+    FaultyLoader::SetUp();
+    DatasetInfo info = sample_info();
+    info.fields[0].box_chunk = {1, 1, 1};
+    std::ofstream(folder_ / "info", std::ios::binary) << encode_info(info);
+  }
+  Result<Volume> read_box() {
+    auto source = opened();
+    if (!source) return source.error();
+    auto part = (*source)->read_part(0, 0, {{1, 0, 1}, {1, 2, 1}});
+    is_running_ = (*source)->process() > 0;
+    return part;
+  }
+  bool is_running_ = false;
+};
+
+TEST_F(FaultyBoxes, ValidAnswerIsAccepted) {
+  respond_with(
+      "fd = send_info()\nif os.fstat(fd).st_size != 16: fail('wrong size')\n"
+      "os.pwrite(fd, struct.pack('<4f', 1, 2, 3, 4), 0)\nos.close(fd)\nsend('filled')\n"
+      "receive()\n");
+  const auto part = read_box();
+  ASSERT_TRUE(part) << part.error().message;
+  EXPECT_EQ(part->dims, (std::array<int, 3>{1, 2, 1}));
+  ASSERT_EQ(part->values.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(part->values[i], static_cast<float>(i + 1));
+  EXPECT_TRUE(is_running_);
+}
+
+TEST_F(FaultyBoxes, AnswersOfAnotherSizeAreRefused) {
+  for (const char* answer : {"send('whole')", "send('part', struct.pack('<4Q', 0, 0, 1, 0))"}) {
+    respond_with(std::string("send_info()\n") + answer + "\nreceive()\n");
+    const auto part = read_box();
+    ASSERT_FALSE(part) << answer;
+    EXPECT_EQ(part.error().message,
+              "the loader of 'some.nc' violated the protocol and was terminated while reading "
+              "'wind'");
+    EXPECT_FALSE(is_running_);
+  }
+}
+
+TEST_F(FaultyBoxes, InvalidNumbersAreRefused) {
+  respond_with(
+      "fd = send_info()\nos.pwrite(fd, struct.pack('<4f', 0, nan, 0, 0), 0)\nos.close(fd)\n"
+      "send('filled')\nreceive()\n");
+  const auto part = read_box();
+  ASSERT_FALSE(part);
+  EXPECT_EQ(part.error().message,
+            "the loader of 'sample.nc' did not mask all invalid numbers while reading 'wind'");
+  EXPECT_FALSE(is_running_);
+}
+
+TEST_F(FaultyBoxes, BeyondTheGridAreNotAskedFor) {
+  respond_with("send_info()\n");
+  auto source = opened();
+  ASSERT_TRUE(source) << source.error().message;
+  const auto part = (*source)->read_part(0, 0, {{1, 0, 1}, {1, 2, 2}});
+  ASSERT_FALSE(part);
+  EXPECT_EQ(part.error().kind, ErrorKind::invalid);
+  EXPECT_EQ(part.error().message, "the box 1,0,1,1,2,2 is beyond the grid");
+}
+
 }  // namespace
 }  // namespace windsplat::data::loader

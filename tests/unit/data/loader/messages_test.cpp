@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -60,6 +61,8 @@ DatasetInfo good() {
   heat.dtype = "int16 packed";
   heat.decoded_bytes = 96;
   heat.chunk_bytes = 48;
+  heat.box_chunk = {3, 1, 2};
+  heat.box_chunk_first = {2, 0, 1};
   info.fields = {wind, heat};
   info.left_out = {{"x", "not a number"}, {"y", "on another grid"}};
   info.notes = {"resampled"};
@@ -109,6 +112,13 @@ void expect_sound(const DatasetInfo& info) {
     ASSERT_EQ(field.component_units.size(), field.components.size());
     ASSERT_GE(field.components.size(), field.kind == FieldKind::scalar ? 1U : 2U);
     ASSERT_LE(field.components.size(), field.kind == FieldKind::scalar ? 1U : 3U);
+    for (std::size_t a = 0; a < 3; ++a) {
+      ASSERT_EQ(field.box_chunk.at(a) > 0, field.is_read_by_boxes());
+      ASSERT_GE(field.box_chunk.at(a), 0);
+      ASSERT_LE(field.box_chunk.at(a), info.grid.dims().at(a));
+      ASSERT_GE(field.box_chunk_first.at(a), 0);
+      ASSERT_LT(field.box_chunk_first.at(a), std::max(1, field.box_chunk.at(a)));
+    }
   }
 }
 
@@ -153,6 +163,8 @@ TEST(LoaderMessages, InfoSurvivesARoundTrip) {
     EXPECT_EQ(out->fields[f].dtype, info.fields[f].dtype);
     EXPECT_EQ(out->fields[f].decoded_bytes, info.fields[f].decoded_bytes);
     EXPECT_EQ(out->fields[f].chunk_bytes, info.fields[f].chunk_bytes);
+    EXPECT_EQ(out->fields[f].box_chunk, info.fields[f].box_chunk);
+    EXPECT_EQ(out->fields[f].box_chunk_first, info.fields[f].box_chunk_first);
   }
   ASSERT_EQ(out->left_out.size(), 2U);
   EXPECT_EQ(out->left_out[1].name, "y");
@@ -344,6 +356,67 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   EXPECT_EQ(selection_text(out->location.selection), "number=3,band=2");
   ASSERT_EQ(out->location.members.size(), 2U);
   EXPECT_EQ(out->location.members[1].name, "b.nc");
+}
+
+TEST(LoaderMessages, ChunksThatNoGridHasAreRefused) {
+  const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
+      {"a chunk longer than the grid", [](DatasetInfo& i) { i.fields[1].box_chunk[1] = 3; }},
+      {"a chunk of negative length",
+       [](DatasetInfo& i) {
+         i.fields[1].box_chunk = {-1, -1, -1};
+       }},
+      {"a chunk without length along one axis",
+       [](DatasetInfo& i) {
+         i.fields[1].box_chunk[2] = 0;
+         i.fields[1].box_chunk_first[2] = 0;
+       }},
+      {"a chunk along one axis only", [](DatasetInfo& i) { i.fields[0].box_chunk[2] = 1; }},
+      {"a chunk that begins behind its end",
+       [](DatasetInfo& i) { i.fields[1].box_chunk_first[2] = 2; }},
+      {"a chunk that begins before the grid",
+       [](DatasetInfo& i) { i.fields[1].box_chunk_first[0] = -1; }},
+  };
+  for (const auto& [what, lie] : lies) {
+    DatasetInfo info = good();
+    lie(info);
+    EXPECT_FALSE(decode_info(encode_info(info))) << what;
+  }
+}
+
+TEST(LoaderMessages, WantedSurvivesARoundTrip) {
+  const DatasetInfo info = good();
+  for (const Wanted& wanted : {Wanted{0, 1, whole_box({3, 2, 4}), 2, true},
+                               Wanted{1, 0, {{1, 0, 2}, {2, 1, 2}}, 0, false}}) {
+    const auto out = decode_wanted(encode_wanted(wanted), info);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->field, wanted.field);
+    EXPECT_EQ(out->step, wanted.step);
+    EXPECT_EQ(out->box, wanted.box);
+    EXPECT_EQ(out->window_layers, wanted.window_layers);
+    EXPECT_EQ(out->keeps_memory, wanted.keeps_memory);
+  }
+}
+
+TEST(LoaderMessages, WhatTheDatasetLacksIsNotRead) {
+  const DatasetInfo info = good();
+  const std::vector<std::pair<const char*, void (*)(Wanted&)>> faults{
+      {"a field beyond the last", [](Wanted& w) { w.field = 2; }},
+      {"a step beyond the last", [](Wanted& w) { w.step = 2; }},
+      {"a box that begins before the grid", [](Wanted& w) { w.box.first[0] = -1; }},
+      {"a box that ends behind the grid", [](Wanted& w) { w.box.count[2] = 3; }},
+      {"a box without samples", [](Wanted& w) { w.box.count[1] = 0; }},
+      {"a box in parts", [](Wanted& w) { w.window_layers = 1; }},
+      {"a box of a field that is not read by boxes", [](Wanted& w) { w.field = 0; }},
+  };
+  const Wanted fine{1, 0, {{1, 0, 2}, {2, 1, 2}}, 0, false};
+  ASSERT_TRUE(decode_wanted(encode_wanted(fine), info));
+  for (const auto& [what, change] : faults) {
+    Wanted wanted = fine;
+    change(wanted);
+    EXPECT_FALSE(decode_wanted(encode_wanted(wanted), info)) << what;
+  }
+  EXPECT_FALSE(decode_wanted(encode_wanted(fine).substr(1), info));
+  EXPECT_FALSE(decode_wanted(encode_wanted(fine) + "x", info));
 }
 
 }  // namespace

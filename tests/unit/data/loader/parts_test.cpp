@@ -142,5 +142,22 @@ TEST_F(LoaderOfParts, FilesThatTheLoaderClosesAreClosed) {
   EXPECT_EQ(fetched_->closed, fetched_->opened - 1) << "one is read later";
 }
 
+// 2 layers of 3 rows of a file of 5 MiB.
+TEST_F(LoaderOfParts, BoxFetchesTheBytesOfItsRowsAlone) {
+  const std::string path = folder_ / "large.nc";
+  test::write_large(path);
+  const auto whole = opened(path);
+  const auto parts = opened_in_parts(path);
+  ASSERT_TRUE(whole && parts);
+  const Box box{{10, 20, 5}, {4, 3, 2}};
+  const auto expected = whole->read(0, 0);
+  fetched_->bytes = 0;
+  const auto got = parts->read_part(0, 0, box);
+  ASSERT_TRUE(expected && got) << (got ? "" : got.error().message);
+  expect_same(*got, cut(*expected, box));
+  EXPECT_GT(fetched_->bytes, 0U);
+  EXPECT_LT(fetched_->bytes, 256U << 10);
+}
+
 }  // namespace
 }  // namespace windsplat::data::loader

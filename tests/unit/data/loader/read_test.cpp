@@ -49,6 +49,28 @@ TEST_F(Loader, ClassicFilesReadAsInThisProcess) {
   }
 }
 
+// Boxes of other sizes one after the other, and the whole between them.
+TEST_F(Loader, BoxesAreCutsOfTheWhole) {
+  for (const int mode : {0, NC_NETCDF4}) {
+    const std::string path = folder_ / "boxes.nc";
+    test::write_wind(path, mode);
+    const auto source = opened(path);
+    ASSERT_NE(source, nullptr);
+    for (std::size_t f = 0; f < source->info().fields.size(); ++f) {
+      for (const std::size_t step : {1, 0}) {
+        const auto whole = source->read(f, step);
+        ASSERT_TRUE(whole) << whole.error().message;
+        for (const Box& box : {Box{{1, 0, 0}, {3, 2, 2}}, Box{{3, 2, 1}, {1, 1, 1}},
+                               Box{{0, 0, 0}, {4, 3, 2}}, Box{{0, 1, 0}, {2, 1, 2}}}) {
+          const auto part = source->read_part(f, step, box);
+          ASSERT_TRUE(part) << part.error().message;
+          expect_same(*part, cut(*whole, box));
+        }
+      }
+    }
+  }
+}
+
 TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   const std::string path = folder_ / "four.nc";
   test::write_wind(path, NC_NETCDF4);
