@@ -224,7 +224,7 @@ bool Budget::is_derived(const ResidentKey& key) const {
     return at != entries_.end() && at->second->listed;
   };
   if (variant == packed_variant) return false;
-  if (field == no_field) return true;
+  if (field == no_field || variant.find(part_variant) != std::string::npos) return true;
   return is_kept(packed_variant) || (!variant.empty() && is_kept(""));
 }
 

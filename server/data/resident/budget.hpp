@@ -144,7 +144,7 @@ class Budget {
   }
   void drop_all(std::uint64_t owner, bool held_too);
   // Whether a volume can be recomputed cheaply: from its packed form, from a resident volume, or
-  // without a field.
+  // without a field; or is a box, which is read in less time than the whole.
   [[nodiscard]] bool is_derived(const ResidentKey& key) const;
   [[nodiscard]] bool may_go(const ResidentKey& key, Urgency urgency) const;
   [[nodiscard]] std::uint64_t evictable_for(Urgency urgency) const;
@@ -224,5 +224,7 @@ std::string megabytes(std::uint64_t bytes);
 
 // The variant of a key under which the packed form of a volume is cached.
 inline constexpr const char* packed_variant = "packed16";
+// What the variant of a box of a field contains.
+inline constexpr const char* part_variant = "box ";
 
 }  // namespace windsplat::data

@@ -12,6 +12,7 @@
 
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/resident/budget.hpp"
@@ -58,6 +59,17 @@ class Dataset {
   // Errors: not_found (no such field or step, or removed during the read), bad_data, out_of_memory,
   // not_resident (evicted during the read), draining (after end()).
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
+
+  // The samples of a box: read without the others, or copied if the volume is resident. They are
+  // kept under a key of their own, and evicted before volumes. Errors: those of volume(); invalid:
+  // a box beyond the grid, or a field that is not read by boxes (reads_apart()).
+  Result<std::shared_ptr<const Volume>> part(const std::string& field, std::size_t step,
+                                             const Box& box);
+  // Whether every `layer_stride`-th layer of these boxes is better read by part() than with the
+  // volume: it is not resident, and either costs far more to read or does not fit into the memory
+  // limit. Never for a field that is not read by boxes.
+  [[nodiscard]] bool reads_apart(const std::string& field, std::size_t step,
+                                 const std::vector<Box>& boxes, int layer_stride = 1) const;
 
   // The field at the step, reduced to a coarser level on first need. The level is shared and
   // counts towards the memory limit; the volume itself need not stay resident for it. Concurrent
@@ -210,6 +222,8 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> difference(const std::string& field, std::size_t index,
                                                    std::size_t step);
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, const Budget::Make& make);
+  // The dataset that is subtracted.
+  [[nodiscard]] Dataset other() const;
   Result<std::shared_ptr<const Volume>> inputs(const std::string& field, std::size_t step,
                                                const Derivation& how,
                                                std::vector<std::shared_ptr<const Volume>>& others);

@@ -101,7 +101,7 @@ struct Dataset::State {
         return unpack(*std::static_pointer_cast<const PackedVolume>(packed));
       });
     }
-    auto volume = read(field, step, urgency);
+    auto volume = read(field, step, urgency, nullptr);
     if (volume && storage == Storage::packed16) {
       // If the packed form does not fit too, only the volume itself is kept.
       (void)budget->get(twin, values_of(info, field) * sizeof(std::uint16_t), Urgency::prefetch,
@@ -110,7 +110,8 @@ struct Dataset::State {
     return volume;
   }
 
-  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency) {
+  // box null: all samples.
+  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency, const Box* box) {
     turnstile.enter(urgency);
     {
       const std::lock_guard lock(mutex);
@@ -125,15 +126,17 @@ struct Dataset::State {
     Reservation inputs(budget);  // of a derived field of a sample; a loader counts its own memory
     const auto held =
         inputs.resize(info.stored_bytes == 0 ? info.fields[field].chunk_bytes : 0, urgency);
-    auto volume = held ? guarded(info.fields[field], [&] { return source->read(field, step); })
-                       : Result<Resident>(held.error());
+    const auto values = [&] {
+      return box ? source->read_part(field, step, *box) : source->read(field, step);
+    };
+    auto volume = held ? guarded(info.fields[field], values) : Result<Resident>(held.error());
     {
       const std::lock_guard lock(mutex);
       loading.reset();
-      if (volume) {
+      if (volume && box == nullptr) {
         const auto& read = *std::static_pointer_cast<const Volume>(*volume);
         seen[{field, step}] = {read.range, read.masked};
-      } else {
+      } else if (!volume) {
         ++counts.failures;
         if (volume.error().kind == ErrorKind::cancelled) volume = why_cancelled();
       }

@@ -37,6 +37,12 @@ Dataset Dataset::minuend() const {
   return out;
 }
 
+Dataset Dataset::other() const {
+  Dataset out = minuend();
+  out.state_ = minus_;
+  return out;
+}
+
 std::string Dataset::digest() const {
   return minus_ ? info().digest + '-' + minus_->info.digest : info().digest;
 }
@@ -73,13 +79,10 @@ Result<std::shared_ptr<const Volume>> Dataset::difference(const std::string& fie
   if (auto same = derived::check_same_field(field, info(), minus_->info); !same) {
     return same.error();
   }
-  Dataset whole = minuend();
-  Dataset other = whole;
-  other.state_ = minus_;
   // Both are referenced, so that neither is evicted before the result is computed from them.
-  auto from = whole.volume(field, step);
+  auto from = minuend().volume(field, step);
   if (!from) return from;
-  auto minus = other.volume(field, minus_step_.value_or(step));
+  auto minus = other().volume(field, minus_step_.value_or(step));
   if (!minus) return minus;
   const auto made = get(key, (*from)->bytes(), [&] {
     return guarded(state_->info.fields[index],
