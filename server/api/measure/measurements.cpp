@@ -45,8 +45,8 @@ struct Pass {
   CancelToken cancel;
   std::string payer;
   std::shared_ptr<http::Reply> reply;
-  std::function<Result<void>()> begin;            // called before the first step; may be empty
-  std::function<void(const data::Volume&)> take;  // called for each step
+  std::function<Result<void>()> begin;                 // called before the first step; may be empty
+  std::function<Result<void>(std::size_t step)> take;  // called for each step
   std::function<http::Response()> finish;
   std::size_t next_step = 0;
 };
@@ -62,9 +62,7 @@ Result<std::optional<http::Response>> take_turn(Pass& pass) {
     if (pass.cancel.cancelled()) {
       return make_error(ErrorKind::cancelled, "request cancelled");
     }
-    const auto volume = load(pass.subject, pass.next_step);
-    if (!volume) return volume.error();
-    pass.take(**volume);
+    if (const auto ok = pass.take(pass.next_step); !ok) return ok.error();
     ++pass.next_step;
     if (Clock::now() >= until) break;
   }
@@ -185,16 +183,23 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
     const bool is_wanted =
         std::find(query.fields.begin(), query.fields.end(), field.name) != query.fields.end();
     const bool is_optional = field.derived && !is_wanted;
-    const auto volume = is_optional
-                            ? dataset.resident_only().volume(field.name, query.step)
-                            : load_field(catalogue, dataset, field.name, query.step, cancel);
-    if (!volume && is_optional) continue;
-    // Fields that cannot be subtracted have no difference.
-    if (!volume && !is_wanted && dataset.subtrahend() && volume.error().kind == ErrorKind::invalid)
-      continue;
-    if (!volume) return http::problem_response(volume.error());
+    const auto& index = located->place.index;
+    Nearby nearby;
+    if (is_optional) {
+      auto there = dataset.resident_only().volume(field.name, query.step);
+      if (!there) continue;
+      nearby.volume = std::move(*there);
+    } else {
+      auto loaded = load_nearby(catalogue, dataset, field.name, query.step, index, cancel);
+      // Fields that cannot be subtracted have no difference.
+      if (!loaded && !is_wanted && dataset.subtrahend() &&
+          loaded.error().kind == ErrorKind::invalid)
+        continue;
+      if (!loaded) return http::problem_response(loaded.error());
+      nearby = std::move(*loaded);
+    }
     out.fields.push_back(probed_field(field));
-    out.values.push_back(data::value_at(**volume, located->place.index));
+    out.values.push_back(nearby.value_at(index));
   }
   return json_response(protocol::encode_probe(out));
 }
@@ -229,7 +234,12 @@ void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::R
   }
   const auto pass = pass_over(std::move(subject), request, std::move(reply));
   const auto range = std::make_shared<data::FieldRange>();
-  pass->take = [range](const data::Volume& volume) { range->add(volume); };
+  pass->take = [range, &subject = pass->subject](std::size_t step) -> Result<void> {
+    const auto volume = load(subject, step);
+    if (!volume) return volume.error();
+    range->add(**volume);
+    return {};
+  };
   pass->finish = [&ranges = backend.ranges, range, of = std::move(of), is_difference,
                   field = pass->subject.field.name] {
     if (!is_difference) ranges.keep(of, field, *range);
@@ -304,8 +314,12 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
     series->position = found->position;
     return {};
   };
-  pass->take = [series, index](const data::Volume& volume) {
-    series->values.push_back(data::value_at(volume, *index));
+  pass->take = [series, index, &of = pass->subject](std::size_t step) -> Result<void> {
+    const auto loaded =
+        load_nearby(*of.catalogue, *of.dataset, of.field.name, step, *index, of.cancel);
+    if (!loaded) return loaded.error();
+    series->values.push_back(loaded->value_at(*index));
+    return {};
   };
   pass->finish = [series] { return json_response(protocol::encode_series(*series)); };
   go_on(loads, pass, false);

@@ -23,6 +23,38 @@ Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalog
   return volume;
 }
 
+Result<std::shared_ptr<const data::Volume>> load_part(tasks::Catalogue& catalogue,
+                                                      const data::Dataset& dataset,
+                                                      const std::string& field, std::size_t step,
+                                                      const data::Box& box,
+                                                      const CancelToken& cancel) {
+  auto part = catalogue.load(
+      dataset, [&](data::Dataset& loading) { return loading.part(field, step, box); }, cancel);
+  if (!part) return tasks::with_dataset_name(part.error(), dataset.info().id, field);
+  return part;
+}
+
+Result<Nearby> load_nearby(tasks::Catalogue& catalogue, const data::Dataset& dataset,
+                           const std::string& field, std::size_t step,
+                           const std::array<int, 3>& index, const CancelToken& cancel) {
+  const data::FieldInfo* const found = dataset.info().find(field);
+  if (found != nullptr && found->is_read_by_boxes()) {
+    const data::Box box = data::box_around(index, *found, dataset.info().grid.dims());
+    if (dataset.reads_apart(field, step, {box})) {
+      auto part = load_part(catalogue, dataset, field, step, box, cancel);
+      if (!part) return part.error();
+      return Nearby{std::move(*part), box.first};
+    }
+  }
+  auto whole = load_field(catalogue, dataset, field, step, cancel);
+  if (!whole) return whole.error();
+  return Nearby{std::move(*whole), {}};
+}
+
+std::optional<std::vector<double>> Nearby::value_at(const std::array<int, 3>& index) const {
+  return data::value_at(*volume, {index[0] - first[0], index[1] - first[1], index[2] - first[2]});
+}
+
 namespace {
 
 struct PlaceQuery {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "protocol/measurements.hpp"
 #include "server/base/cancel.hpp"
@@ -44,6 +45,26 @@ protocol::PositionDescription position_of(const data::Grid& grid, const std::arr
 // such field, no heights as geometry.heightField takes them).
 Result<Located> locate(tasks::Catalogue& catalogue, const data::Dataset& dataset,
                        const Position& position, const CancelToken& cancel);
+
+// A field near a sample: the samples of a box that it lies in, or all of them, where the box costs
+// hardly less to read or all are in memory.
+struct Nearby {
+  std::shared_ptr<const data::Volume> volume;
+  std::array<int, 3> first{0, 0, 0};  // the index of the first sample
+  // The components at the sample; empty if it is masked.
+  [[nodiscard]] std::optional<std::vector<double>> value_at(const std::array<int, 3>& index) const;
+};
+// Errors: those of load_field().
+Result<Nearby> load_nearby(tasks::Catalogue& catalogue, const data::Dataset& dataset,
+                           const std::string& field, std::size_t step,
+                           const std::array<int, 3>& index, const CancelToken& cancel);
+
+// The samples of a box alone (Dataset::part()). Errors: those of load_field().
+Result<std::shared_ptr<const data::Volume>> load_part(tasks::Catalogue& catalogue,
+                                                      const data::Dataset& dataset,
+                                                      const std::string& field, std::size_t step,
+                                                      const data::Box& box,
+                                                      const CancelToken& cancel);
 
 // A field at a step. Errors: those of loading, with the names of dataset and field.
 Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalogue,
