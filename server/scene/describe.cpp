@@ -15,6 +15,7 @@
 #include "server/data/model/measure.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/defaults.hpp"
 #include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
@@ -129,7 +130,44 @@ void add_bounded(const std::vector<std::string>& unread, std::vector<std::string
                   " more fields are not known");
 }
 
+// The view that a dataset is first shown with, and notes on it. `has_damage`: some fields cannot be
+// read.
+Result<void> add_default_view(data::Dataset& dataset, bool has_damage, RangesOf ranges,
+                              protocol::DatasetDescription& out) {
+  if (const auto unfit = why_not_shown(dataset);
+      ranges == RangesOf::seen && unfit && !unfit->empty()) {
+    out.notes.push_back("it can be probed, but not shown: " + *unfit);
+    return {};
+  }
+  auto completed = complete(out.default_view, dataset);
+  if (!completed) {
+    const bool is_damage = completed.error().kind == ErrorKind::bad_data;
+    return is_damage && has_damage ? Result<void>() : completed.error();
+  }
+  out.default_view = completed->view();
+  auto hidden = hidden_vectors(out.default_view, dataset);
+  if (!hidden) return hidden.error();
+  std::string unshown = unshown_scalars(out.default_view, dataset.info());
+  for (std::string* note : {&*hidden, &unshown}) {
+    if (!note->empty()) out.notes.push_back(std::move(*note));
+  }
+  return {};
+}
+
 }  // namespace
+
+Result<std::string> why_not_shown(const data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  const std::vector<std::string> fields = fields_of({}, info);
+  const auto room = dataset.check_room(fields);
+  if (room) return std::string();
+  const auto is_read_by_boxes = [&](const std::string& field) {
+    const data::FieldInfo* const found = info.find(field);
+    return found != nullptr && found->is_read_by_boxes();
+  };
+  if (!std::all_of(fields.begin(), fields.end(), is_read_by_boxes)) return room.error();
+  return room.error().message;
+}
 
 void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription& description) {
   const auto samples = static_cast<std::int64_t>(dataset.info().grid.samples());
@@ -216,21 +254,11 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   out.resident_bytes = dataset.resident_bytes();
   out.bytes_when_resident = components * info.grid.samples() * sizeof(float) * info.steps.size();
   out.default_view.dataset = info.id;
-  if (ranges != RangesOf::none) {
-    auto completed = complete(out.default_view, dataset);
-    const bool damaged = !completed && completed.error().kind == ErrorKind::bad_data;
-    if (!completed && !(damaged && !unread.empty())) return completed.error();
-    if (completed) {
-      out.default_view = completed->view();
-      auto hidden = hidden_vectors(out.default_view, dataset);
-      if (!hidden) return hidden.error();
-      std::string unshown = unshown_scalars(out.default_view, info);
-      for (std::string* note : {&*hidden, &unshown}) {
-        if (!note->empty()) out.notes.push_back(std::move(*note));
-      }
-    }
-    if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
+  if (ranges == RangesOf::none) return out;
+  if (auto done = add_default_view(dataset, !unread.empty(), ranges, out); !done) {
+    return done.error();
   }
+  if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
   return out;
 }
 

@@ -1,16 +1,22 @@
 // Dataset -> the description for the HTTP API, the stream and `inspect`.
 #pragma once
 
+#include <string>
+
 #include "protocol/messages.hpp"
 #include "server/base/error.hpp"
 #include "server/data/resident/dataset.hpp"
 
 namespace windsplat::scene {
 
+// Why the default view of a dataset cannot be shown at any step, though boxes of its fields can be
+// read, so that it can be probed; empty: it can be shown. Errors: out_of_memory, if neither can.
+Result<std::string> why_not_shown(const data::Dataset& dataset);
+
 enum class RangesOf {
   none,        // loads nothing; no ranges, masked counts or defaultView
-  seen,        // "rangeOf": "step"; loads the fields of defaultView and adds the ranges of all
-               // fields that have been loaded at the first step
+  seen,        // "rangeOf": "step"; loads the fields of defaultView, unless it is not shown, and
+               // adds the ranges of all fields that have been loaded at the first step
   first_step,  // "rangeOf": "step"
   all_steps,   // "rangeOf": "all"; reads the whole series once
 };

@@ -29,6 +29,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/describe.hpp"
 #include "server/transport/server.hpp"
 #include "server/uploads/uploads.hpp"
 #include "server/views/saved_views.hpp"
@@ -167,9 +168,11 @@ class Control {
   bool draining_ = false;
 };
 
-// Reject a dataset whose default fields cannot be loaded: every frame of it would fail.
+// Reject a dataset whose default fields cannot be loaded: every frame of it would fail. Where boxes
+// of them can be read, it can be probed.
 Result<void> check_first_view(const data::Dataset& dataset) {
-  return dataset.check_room(scene::fields_of({}, dataset.info()));
+  const auto unfit = scene::why_not_shown(dataset);
+  return unfit ? Result<void>() : unfit.error();
 }
 
 // One bad file does not prevent serving the others, unless `strict`: it is listed as failed. The
