@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -126,6 +127,25 @@ void expect_premultiplied(const engine::Image& image) {
   }
 }
 
+// The middle of a field, read as a box, has the values of the whole.
+void expect_cut(Source& source, std::size_t field, std::size_t step, const Volume& whole) {
+  Box box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.first.at(a) = whole.dims.at(a) / 3;
+    box.count.at(a) = std::max(1, whole.dims.at(a) / 3);
+  }
+  const auto part = source.read_part(field, step, box);
+  if (!part) {  // of a service, whose answer is not among the files
+    expect(part.error().kind != ErrorKind::internal, "no file may cause an internal error",
+           part.error().message);
+    return;
+  }
+  const Volume wanted = cut(whole, box);
+  expect(part->dims == wanted.dims && part->bytes() == wanted.bytes() &&
+             std::memcmp(part->component(0), wanted.component(0), wanted.bytes()) == 0,
+         "a box has the values of the whole");
+}
+
 // The default view except for size and threshold, with both methods of streams.
 void draw(std::unique_ptr<FileSource> source) {
   if (source->info().grid.samples() > drawn_samples_max) return;
@@ -215,6 +235,7 @@ void read_dataset(const std::shared_ptr<Files>& files) {
     const auto volume = (*source)->read(field, step);
     if (volume) {
       expect_whole(*volume, info, about);
+      expect_cut(**source, field, step, *volume);
     } else {
       expect(volume.error().kind != ErrorKind::internal, "no file may cause an internal error",
              volume.error().message);
