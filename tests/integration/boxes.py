@@ -22,7 +22,8 @@ LIMIT = 192  # MiB, of which 68 are for data
 SIDES = (512, 1024, 1024)  # x, y, z of the raw file: 2 GiB, and a vector of 6 GiB
 SHAPE = (200, 300, 320)  # z, y, x of the netCDF files: 73 MiB
 HOURS = (0, 6, 12)
-SPACINGS = {"chunked": 0.2, "times": 360 / SHAPE[2], "classic": 0.2}  # degrees of longitude
+SPACINGS = {"chunked": 0.2, "times": 360 / SHAPE[2], "classic": 0.2,
+            "one_chunk": 0.2}  # degrees of longitude
 
 
 def write_raw(folder):
@@ -37,7 +38,9 @@ def write_raw(folder):
     with open(folder / "large.raw", "wb") as file:
         file.truncate(16 * samples)
         for index in [(0, 0, 0), tuple(n - 1 for n in SIDES),
-                      *(tuple(map(int, rng.integers(0, SIDES))) for _ in range(20))]:
+                      *(tuple(map(int, rng.integers(0, SIDES))) for _ in range(12)),
+                      *(tuple(64 * int(rng.integers(0, n // 64)) for n in SIDES)
+                        for _ in range(12))]:
             at = index[0] + SIDES[0] * (index[1] + SIDES[1] * index[2])
             known[index] = [float(np.float32(value)) for value in rng.normal(size=4)]
             file.seek(4 * at)
@@ -82,11 +85,12 @@ class Boxes(unittest.TestCase):
         write_grid(folder / "chunked.nc", (1, 33, 64, 50))
         write_grid(folder / "times.nc", (3, 20, 40, 320))
         write_grid(folder / "classic.nc", None)
+        write_grid(folder / "one_chunk.nc", (1, *SHAPE))
         with netCDF4.Dataset(folder / "chunked.nc") as file:
             # South first, and the greatest pressure first.
             cls.t = np.ma.filled(file["t"][:].astype("f4"), np.nan)[:, ::-1, ::-1]
         cls.daemon = Daemon(PROGRAM, folder / "large.json", folder / "chunked.nc",
-                            folder / "times.nc", folder / "classic.nc",
+                            folder / "times.nc", folder / "classic.nc", folder / "one_chunk.nc",
                             f"--memory-limit={LIMIT}M")
 
     @classmethod
@@ -123,11 +127,31 @@ class Boxes(unittest.TestCase):
     def test_descriptions_say_what_pictures_need(self):
         for dataset in ("large", "chunked"):
             notes = " ".join(self.get(dataset).json()["notes"])
-            self.assertRegex(notes, "can be probed, but not shown: .* would suffice")
+            self.assertRegex(notes, "is not shown, but its fields can be probed: .* would suffice")
             answer = self.daemon.get(f"/v1/datasets/{dataset}/frame.png?width=32&height=32")
             status, detail = answer.detail()
             self.assertEqual(status, 507, detail)
             self.assertIn("would suffice", detail)
+
+    def test_fields_whose_chunks_do_not_fit_are_refused_with_the_limit_that_would_suffice(self):
+        listed = {one["id"]: one for one in self.daemon.get("/v1/datasets").json()["datasets"]}
+        failed = [name for name, one in listed.items() if one["state"] == "failed"]
+        self.assertEqual(failed, ["one_chunk"])
+        self.assertRegex(" ".join(listed["one_chunk"]["notes"]),
+                         "'t' needs 73.2 MiB at a step; .* would suffice")
+
+    def loads(self):
+        text = self.daemon.get("/metrics").body.decode()
+        return int(re.search(r'^windsplat_volume_loads_total{result="ok"} (\d+)', text, re.M)[1])
+
+    def test_strided_layers_of_a_column_are_read_together(self):
+        i, j, k = next(index for index in self.known if index[2] % 2 == 1)
+        before = self.loads()
+        column = self.array(f"bbox={i},{j},{i},{j}&stride=1,1,2&level=1,{SIDES[2] - 1}",
+                            "large", "q").ravel()
+        self.assertEqual(column.size, SIDES[2] // 2)
+        self.assertEqual(column[k // 2], np.float32(self.known[i, j, k][0]))
+        self.assertLess(self.loads() - before, 4)
 
     def test_probes_of_a_sparse_file_of_gigabytes_are_its_numbers(self):
         for index, values in self.known.items():

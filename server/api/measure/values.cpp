@@ -360,8 +360,9 @@ Result<void> copy_pieces(const Subject& subject, const Selection& selection, std
   constexpr std::size_t piece_values = std::size_t{4} << 20;
   const std::array<int, 3> dims = subject.dataset->info().grid.dims();
   for (const Span& span : spans_of(selection.crop)) {
+    const int apart = data::layers_apart(span.box, selection.stride[2], subject.field, dims);
     for (const data::Box& piece :
-         data::pieces_of(span.box, selection.stride[2], subject.field, dims, piece_values)) {
+         data::pieces_of(span.box, apart, subject.field, dims, piece_values)) {
       if (subject.cancel.cancelled()) {
         return make_error(ErrorKind::cancelled, "request cancelled");
       }

@@ -291,18 +291,19 @@ BoxChunk box_chunk(const ArrayFile& file, const Placement& grid,
   for (const int variable : variables) {
     const FileVariable& about = file.contents().variables.at(at(variable));
     const std::vector<std::size_t> chunk = file.chunk(variable);
-    BoxChunk own{{1, 1, 1}, {0, 0, 0}};
     for (std::size_t a = 0; a < 3; ++a) {
+      out.length.at(a) = std::max(out.length.at(a), 1);
       if (grid.space.at(a) < 0) continue;
       const auto place = std::find(about.dims.begin(), about.dims.end(), grid.space.at(a));
       if (place == about.dims.end() || !about.layers_apart) return {};
-      const std::size_t all = grid.length.at(a);
       const std::size_t length =
-          std::min(chunk[static_cast<std::size_t>(place - about.dims.begin())], all);
-      own.length.at(a) = static_cast<int>(length);
-      own.first.at(a) = static_cast<int>(grid.turned.at(a) ? all % length : 0);
+          std::min(chunk[static_cast<std::size_t>(place - about.dims.begin())], grid.length.at(a));
+      out.length.at(a) = std::max(out.length.at(a), static_cast<int>(length));
     }
-    if (out.length[0] == 0) out = own;
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto all = static_cast<int>(grid.length.at(a));
+    if (grid.turned.at(a)) out.first.at(a) = all % out.length.at(a);
   }
   return out;
 }

@@ -40,7 +40,8 @@ Result<void> read_box(const ArrayFile& file, const Placement& grid, int variable
 void mask_columns(const std::vector<bool>& columns, const Box& box, std::size_t width,
                   float* values);
 
-// FieldInfo::box_chunk and box_chunk_first of the components of a field: those of the first.
+// FieldInfo::box_chunk and box_chunk_first of the components of a field: the longest chunk of any
+// component along each axis.
 struct BoxChunk {
   std::array<int, 3> length{0, 0, 0};
   std::array<int, 3> first{0, 0, 0};

@@ -171,7 +171,11 @@ class ArraySource final : public FileSource {
     for (std::size_t c = 0; c < plan.variables.size(); ++c) {
       const int v = plan.variables[c];
       float* const values = out + c * box.samples();
-      auto read = read_box(*file_, placement_, v, step, box, values, [](double) {});
+      const auto tell = [&](double part) {
+        report_progress((static_cast<double>(c) + part) /
+                        static_cast<double>(plan.variables.size()));
+      };
+      auto read = read_box(*file_, placement_, v, step, box, values, tell);
       if (!read) return read.error();
       forget_step(*file_, placement_, v);
       multiply(plan.factors[c], box.samples(), values);

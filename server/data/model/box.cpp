@@ -110,6 +110,17 @@ Box box_around(const std::array<int, 3>& index, const FieldInfo& field,
   return out;
 }
 
+int layers_apart(const Box& box, int layer_stride, const FieldInfo& field,
+                 const std::array<int, 3>& dims, double values_min) {
+  const int chunk = field.box_chunk[2];
+  double values = static_cast<double>(field.components.size()) * (layer_stride - chunk);
+  for (const std::size_t a : {0U, 1U}) {
+    values *= chunk_at(box.first.at(a) + box.count.at(a) - 1, a, field, dims.at(a)).end() -
+              chunk_at(box.first.at(a), a, field, dims.at(a)).first;
+  }
+  return values >= values_min ? layer_stride : 1;
+}
+
 double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
                      const std::array<int, 3>& dims) {
   double share = 1;

@@ -35,6 +35,11 @@ std::string key_of(const Box& box);
 // samples long along each axis.
 Box box_around(const std::array<int, 3>& index, const FieldInfo& field,
                const std::array<int, 3>& dims);
+// The distance of the layers that are read of a box of which every `layer_stride`-th is wanted:
+// those between are left out if they have `values_min` values, since each piece costs a read.
+constexpr double left_out_values_min = 1 << 18;
+int layers_apart(const Box& box, int layer_stride, const FieldInfo& field,
+                 const std::array<int, 3>& dims, double values_min = left_out_values_min);
 // The share of a step that is decoded to read every `layer_stride`-th layer of a box.
 double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
                      const std::array<int, 3>& dims);

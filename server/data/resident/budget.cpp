@@ -14,6 +14,10 @@ namespace windsplat::data {
 
 namespace {
 
+bool is_box(const ResidentKey& key) {
+  return std::get<3>(key).find(part_variant) != std::string::npos;
+}
+
 constexpr const char* other_memory = "memory other than fields";
 
 // Other threads wait for the result, so exceptions become errors.
@@ -78,6 +82,7 @@ Result<Resident> Budget::get(const ResidentKey& key, std::uint64_t bytes, Urgenc
     recent_.push_front(key);
     entry->place = recent_.begin();
     entry->listed = true;
+    if (is_box(key)) drop_old_boxes();
   } else {
     used_ -= bytes;
     entries_.erase(key);
@@ -217,6 +222,15 @@ void Budget::drop_all(std::uint64_t owner, bool held_too) {
   }
 }
 
+void Budget::drop_old_boxes() {
+  std::size_t boxes = 0;
+  for (auto at = recent_.begin(); at != recent_.end();) {
+    const auto next = std::next(at);
+    if (is_box(*at) && ++boxes > parts_kept_max && !is_held(*entries_.at(*at))) drop(at);
+    at = next;
+  }
+}
+
 bool Budget::is_derived(const ResidentKey& key) const {
   const auto& [owner, field, step, variant] = key;
   const auto is_kept = [&, &owner = owner, &field = field, &step = step](const char* origin) {
@@ -224,7 +238,7 @@ bool Budget::is_derived(const ResidentKey& key) const {
     return at != entries_.end() && at->second->listed;
   };
   if (variant == packed_variant) return false;
-  if (field == no_field || variant.find(part_variant) != std::string::npos) return true;
+  if (field == no_field || is_box(key)) return true;
   return is_kept(packed_variant) || (!variant.empty() && is_kept(""));
 }
 

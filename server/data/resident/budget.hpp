@@ -143,6 +143,7 @@ class Budget {
     return requested_.count(key) > 0;
   }
   void drop_all(std::uint64_t owner, bool held_too);
+  void drop_old_boxes();
   // Whether a volume can be recomputed cheaply: from its packed form, from a resident volume, or
   // without a field; or is a box, which is read in less time than the whole.
   [[nodiscard]] bool is_derived(const ResidentKey& key) const;
@@ -224,7 +225,9 @@ std::string megabytes(std::uint64_t bytes);
 
 // The variant of a key under which the packed form of a volume is cached.
 inline constexpr const char* packed_variant = "packed16";
-// What the variant of a box of a field contains.
+// What the variant of a box of a field contains. The last few of all datasets are kept, so that
+// their number does not make the search for room slow.
 inline constexpr const char* part_variant = "box ";
+inline constexpr std::size_t parts_kept_max = 256;
 
 }  // namespace windsplat::data

@@ -237,8 +237,8 @@ std::optional<Dataset::Seen> Dataset::seen(const std::string& field, std::size_t
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) return std::nullopt;
   const std::lock_guard lock(state_->mutex);
-  const auto found = state_->seen.find({*index, step});
-  return found == state_->seen.end() ? std::nullopt : std::optional(found->second);
+  const auto found = state_->reads.find({*index, step});
+  return found == state_->reads.end() ? std::nullopt : found->second.seen;
 }
 
 Dataset::Counts Dataset::counts() const {

@@ -66,10 +66,13 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> part(const std::string& field, std::size_t step,
                                              const Box& box);
   // Whether every `layer_stride`-th layer of these boxes is better read by part() than with the
-  // volume: it is not resident, and either costs far more to read or does not fit into the memory
-  // limit. Never for a field that is not read by boxes.
+  // volume, which is not resident: the volume does not fit into the memory limit, or costs far more
+  // to read than these boxes and those read of it before. Never for a field that is not read by
+  // boxes.
   [[nodiscard]] bool reads_apart(const std::string& field, std::size_t step,
                                  const std::vector<Box>& boxes, int layer_stride = 1) const;
+  // Whether samples of a field can be read within the memory limit: its volume, or boxes.
+  [[nodiscard]] bool reads_within_limit(const std::string& field) const;
 
   // The field at the step, reduced to a coarser level on first need. The level is shared and
   // counts towards the memory limit; the volume itself need not stay resident for it. Concurrent

@@ -49,6 +49,12 @@ Result<Resident> guarded(const FieldInfo& field, const Make& make) {
   }
 }
 
+// What was read of a field at a step.
+struct StepReads {
+  std::optional<Dataset::Seen> seen;  // of the volume
+  double apart = 0;  // the share of the step that was decoded for boxes since the volume was read
+};
+
 struct Dataset::State {
   State(std::unique_ptr<Source> from, std::string id, std::shared_ptr<Budget> shared, Storage how)
       : source(std::move(from)),
@@ -133,10 +139,12 @@ struct Dataset::State {
     {
       const std::lock_guard lock(mutex);
       loading.reset();
-      if (volume && box == nullptr) {
+      if (volume && box != nullptr) {
+        reads[{field, step}].apart += decoded_share(*box, 1, info.fields[field], info.grid.dims());
+      } else if (volume) {
         const auto& read = *std::static_pointer_cast<const Volume>(*volume);
-        seen[{field, step}] = {read.range, read.masked};
-      } else if (!volume) {
+        reads[{field, step}] = {Seen{read.range, read.masked}, 0};
+      } else {
         ++counts.failures;
         if (volume.error().kind == ErrorKind::cancelled) volume = why_cancelled();
       }
@@ -189,8 +197,8 @@ struct Dataset::State {
   std::optional<Loading> loading;
   bool ended = false;
   bool forgotten = false;
-  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // keyed by field and step
-  std::map<std::size_t, float> errors;                       // packing errors, by field
+  std::map<std::pair<std::size_t, std::size_t>, StepReads> reads;  // keyed by field and step
+  std::map<std::size_t, float> errors;                             // packing errors, by field
   std::string kept_key;
   std::any kept_value;
 };

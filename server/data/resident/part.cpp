@@ -4,6 +4,7 @@
 
 #include "server/data/derived/difference.hpp"
 #include "server/data/resident/dataset_state.hpp"
+#include "server/data/resident/sizes.hpp"
 
 namespace windsplat::data {
 
@@ -11,10 +12,25 @@ namespace {
 
 // Smaller volumes are read as a whole: the next box then costs nothing.
 constexpr std::uint64_t apart_bytes_min = std::uint64_t{4} << 20;
-// Of a step, decoded for the boxes.
+// Of a step, decoded for all boxes of it.
 constexpr double apart_share_max = 0.5;
-// A part counts as so much at least, which bounds the number of keys.
-constexpr std::uint64_t part_bytes_min = std::uint64_t{16} << 10;
+
+// Adds the box, and the limit that would suffice for it beside a loader that reads the field.
+Error with_need_of_box(Error error, const DatasetInfo& info, const FieldInfo& field, const Box& box,
+                       std::uint64_t beside, const Budget& budget) {
+  if (error.kind != ErrorKind::out_of_memory) return error;
+  const auto size = [](const std::array<int, 3>& n) {
+    return std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]);
+  };
+  error.message = "a box of " + size(box.count) + " samples, in chunks of " +
+                  size(field.box_chunk) + ", cannot be read: " + error.message;
+  const std::uint64_t all =
+      bytes_of_box(field, box) + (info.stored_bytes > 0 ? reading_box_bytes(field) : 0) + beside;
+  if (all > budget.bytes_max() && budget.name().raised) {
+    error.message += "; " + budget.name().raised(all) + " would suffice";
+  }
+  return error;
+}
 
 }  // namespace
 
@@ -28,16 +44,34 @@ bool Dataset::reads_apart(const std::string& field, std::size_t step, const std:
                  !minus_->info.find(field)->is_read_by_boxes())) {
     return false;
   }
-  if (!is_within_limit(loading_bytes(field))) return true;
+  const std::uint64_t reading = state_->bytes_beside(reading_bytes(info(), {field}));
+  if (loading_bytes(field) + reading > state_->budget->bytes_max()) return true;
   if (level_bytes(field, {}) < apart_bytes_min) return false;
-  const auto decoded = [&](const DatasetInfo& of) {
+  const auto decoded = [&](const State& of, std::size_t at) {
     double share = 0;
+    {
+      const std::lock_guard lock(of.mutex);
+      const auto read = of.reads.find({*of.find(field, at), at});
+      if (read != of.reads.end()) share = read->second.apart;
+    }
     for (const Box& box : boxes) {
-      share += decoded_share(box, layer_stride, *of.find(field), of.grid.dims());
+      const FieldInfo& about = *of.info.find(field);
+      const int apart = layers_apart(box, layer_stride, about, of.info.grid.dims());
+      share += decoded_share(box, apart, about, of.info.grid.dims());
     }
     return share;
   };
-  return std::max(decoded(info()), minus_ ? decoded(minus_->info) : 0) <= apart_share_max;
+  return decoded(*state_, step) <= apart_share_max &&
+         (!minus_ || decoded(*minus_, minus_step_.value_or(step)) <= apart_share_max);
+}
+
+bool Dataset::reads_within_limit(const std::string& field) const {
+  const FieldInfo& about = *info().find(field);
+  if (is_within_limit(loading_bytes(field))) return true;
+  const std::uint64_t bytes =
+      bytes_of_box(about, box_around({0, 0, 0}, about, info().grid.dims())) +
+      state_->bytes_beside(reading_box_bytes(about));
+  return about.is_read_by_boxes() && bytes <= state_->budget->bytes_max();
 }
 
 Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, std::size_t step,
@@ -55,16 +89,18 @@ Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, st
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  const std::uint64_t bytes =
-      std::max(part_bytes_min, box.samples() * about.components.size() * sizeof(float));
+  const std::uint64_t bytes = bytes_of_box(about, box);
   if (!minus_) {
-    return as_volume(get(key, bytes, [&]() -> Result<Resident> {
+    const auto made = get(key, bytes, [&]() -> Result<Resident> {
       const Resident whole = state_->budget->find_now({state_->owner, *index, step, ""});
       if (!whole) return state_->read(*index, step, urgency(), &box);
       return guarded(about, [&]() -> Result<Volume> {
         return cut(*std::static_pointer_cast<const Volume>(whole), box);
       });
-    }));
+    });
+    if (made) return as_volume(made);
+    return with_need_of_box(made.error(), info(), about, box, state_->charged.bytes(),
+                            *state_->budget);
   }
   if (const auto there = state_->budget->find(key)) {
     if (*there && own_) own_->insert((*there)->get());

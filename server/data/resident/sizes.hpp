@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data {
@@ -26,6 +27,10 @@ inline std::uint64_t bytes_of(const DatasetInfo& info) {
 
 inline std::uint64_t values_of(const DatasetInfo& info, std::size_t field) {
   return info.grid.samples() * info.fields[field].components.size();
+}
+
+inline std::uint64_t bytes_of_box(const FieldInfo& field, const Box& box) {
+  return box.samples() * field.components.size() * sizeof(float);
 }
 
 // Fields without duplicates.
@@ -54,6 +59,12 @@ inline std::uint64_t reading_bytes(const DatasetInfo& info,
     bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
   }
   return bytes;
+}
+
+// The same while it reads a box of a field, of which no chunks are kept.
+inline std::uint64_t reading_box_bytes(const FieldInfo& field) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  return field.chunk_bytes <= sizeof(double) ? 32 * mib : 48 * mib + 2 * field.chunk_bytes;
 }
 
 }  // namespace windsplat::data

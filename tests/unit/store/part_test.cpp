@@ -144,18 +144,57 @@ TEST(Part, OfAFieldBeyondTheMemoryLimitIsReadWhateverItCosts) {
   const auto much = f.dataset.part("f", 0, whole_box(large_dims));
   ASSERT_FALSE(much);
   EXPECT_EQ(much.error().kind, ErrorKind::out_of_memory);
+  EXPECT_THAT(much.error().message,
+              HasSubstr("a box of 128 x 128 x 80 samples, in chunks of 128 x 128 x 80, cannot be "
+                        "read: the field needs 5.0 MiB"));
 }
 
 TEST(Part, IsEvictedBeforeVolumes) {
   PartFixture f(large_bytes + (std::uint64_t{1} << 20));
   ASSERT_TRUE(f.dataset.volume("f", 0));
-  for (int n = 0; n < 70; ++n) {  // of 16 KiB each
-    ASSERT_TRUE(f.dataset.part("f", 1, {{n, 0, 0}, {1, 1, 1}}));
+  for (int n = 0; n < 5; ++n) {  // of 256 KiB each
+    ASSERT_TRUE(f.dataset.part("f", 1, {{n, 0, 0}, {64, 64, 16}}));
   }
   EXPECT_TRUE(f.dataset.resident_only().volume("f", 0));
-  EXPECT_FALSE(f.dataset.resident_only().part("f", 1, {{0, 0, 0}, {1, 1, 1}}));
-  EXPECT_TRUE(f.dataset.resident_only().part("f", 1, {{69, 0, 0}, {1, 1, 1}}));
+  EXPECT_FALSE(f.dataset.resident_only().part("f", 1, {{0, 0, 0}, {64, 64, 16}}));
+  EXPECT_TRUE(f.dataset.resident_only().part("f", 1, {{4, 0, 0}, {64, 64, 16}}));
   EXPECT_LE(f.dataset.resident_bytes(), large_bytes + (std::uint64_t{1} << 20));
+}
+
+// The search for room visits every entry.
+TEST(Part, OnlyTheLastOnesAreKept) {
+  PartFixture f;
+  const auto box = [](std::size_t n) {
+    return Box{{static_cast<int>(n % 128), static_cast<int>(n / 128), 0}, {1, 1, 1}};
+  };
+  const auto held = f.dataset.part("f", 0, box(0));
+  for (std::size_t n = 1; n < parts_kept_max + 10; ++n) {
+    ASSERT_TRUE(f.dataset.part("f", 0, box(n)));
+  }
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < parts_kept_max + 10; ++n) {
+    kept += f.dataset.resident_only().part("f", 0, box(n)) ? 1U : 0U;
+  }
+  EXPECT_EQ(kept, parts_kept_max + 1) << "one is in use";
+  EXPECT_FALSE(f.dataset.resident_only().part("f", 0, box(9)));
+  EXPECT_TRUE(f.dataset.resident_only().part("f", 0, box(10)));
+}
+
+TEST(Part, VolumeIsReadOnceBoxesWouldCostMoreThanHalfOfIt) {
+  PartFixture f(4 * large_bytes, large_dims, {64, 64, 40});  // eight chunks
+  const auto box = [](int n) {
+    return Box{{64 * (n % 2), 64 * (n / 2 % 2), 40 * (n / 4)}, {1, 1, 1}};
+  };
+  for (int n = 0; n < 4; ++n) {
+    EXPECT_TRUE(f.dataset.reads_apart("f", 1, {box(n)})) << n;
+    ASSERT_TRUE(f.dataset.part("f", 1, box(n)));
+  }
+  EXPECT_FALSE(f.dataset.reads_apart("f", 1, {box(4)}));
+  EXPECT_TRUE(f.dataset.reads_apart("f", 0, {box(4)})) << "of another step";
+  EXPECT_FALSE(f.dataset.minus(f.dataset, 1).value().reads_apart("f", 0, {box(4)}));
+  ASSERT_TRUE(f.dataset.volume("f", 1));
+  f.dataset.evict();
+  EXPECT_TRUE(f.dataset.reads_apart("f", 1, {box(4)})) << "after it was read";
 }
 
 TEST(Part, BeyondTheGridOrOfAFieldThatIsReadAsAWholeIsRefused) {

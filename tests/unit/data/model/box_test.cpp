@@ -154,6 +154,21 @@ TEST(Box, ShareIsThatOfTheSamplesInItsChunks) {
   }
 }
 
+TEST(Box, LayersAreLeftOutWhereThatSavesMoreThanARead) {
+  FieldInfo wind;
+  wind.components = {"u", "v"};
+  wind.box_chunk = {16, 1, 2};
+  const std::array<int, 3> dims{512, 512, 99};
+  // 256 x 256 x 2 values a layer.
+  const Box box{{17, 0, 0}, {240, 256, 99}};
+  EXPECT_EQ(layers_apart(box, 3, wind, dims, 131072), 3) << "one layer";
+  EXPECT_EQ(layers_apart(box, 3, wind, dims, 131073), 1);
+  EXPECT_EQ(layers_apart(box, 4, wind, dims, 262144), 4);
+  EXPECT_EQ(layers_apart(box, 2, wind, dims, 1), 1) << "a chunk holds the next";
+  EXPECT_EQ(layers_apart({{0, 0, 0}, {1, 1, 99}}, 64, wind, dims), 1);
+  EXPECT_EQ(layers_apart(whole_box(dims), 3, wind, dims), 3);
+}
+
 TEST(Box, PiecesHoldEveryTakenLayerOnceInWholeChunks) {
   std::mt19937 random(3);
   for (int round = 0; round < 1000; ++round) {
