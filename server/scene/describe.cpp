@@ -136,7 +136,7 @@ Result<void> add_default_view(data::Dataset& dataset, bool has_damage, RangesOf 
                               protocol::DatasetDescription& out) {
   if (const auto unfit = why_not_shown(dataset);
       ranges == RangesOf::seen && unfit && !unfit->empty()) {
-    out.notes.push_back("it can be probed, but not shown: " + *unfit);
+    out.notes.push_back("its default view is not shown, but its fields can be probed: " + *unfit);
     return {};
   }
   auto completed = complete(out.default_view, dataset);
@@ -158,14 +158,12 @@ Result<void> add_default_view(data::Dataset& dataset, bool has_damage, RangesOf 
 
 Result<std::string> why_not_shown(const data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
-  const std::vector<std::string> fields = fields_of({}, info);
-  const auto room = dataset.check_room(fields);
+  const auto room = dataset.check_room(fields_of({}, info));
   if (room) return std::string();
-  const auto is_read_by_boxes = [&](const std::string& field) {
-    const data::FieldInfo* const found = info.find(field);
-    return found != nullptr && found->is_read_by_boxes();
+  const auto is_probed = [&](const data::FieldInfo& field) {
+    return field.derived || dataset.reads_within_limit(field.name);
   };
-  if (!std::all_of(fields.begin(), fields.end(), is_read_by_boxes)) return room.error();
+  if (!std::all_of(info.fields.begin(), info.fields.end(), is_probed)) return room.error();
   return room.error().message;
 }
 

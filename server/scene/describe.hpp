@@ -9,8 +9,8 @@
 
 namespace windsplat::scene {
 
-// Why the default view of a dataset cannot be shown at any step, though boxes of its fields can be
-// read, so that it can be probed; empty: it can be shown. Errors: out_of_memory, if neither can.
+// Why the default view of a dataset cannot be shown at any step, though each of its stored fields
+// can be probed; empty: it can be shown. Errors: out_of_memory, if neither can.
 Result<std::string> why_not_shown(const data::Dataset& dataset);
 
 enum class RangesOf {

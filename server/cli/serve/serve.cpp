@@ -169,10 +169,15 @@ class Control {
 };
 
 // Reject a dataset whose default fields cannot be loaded: every frame of it would fail. Where boxes
-// of them can be read, it can be probed.
-Result<void> check_first_view(const data::Dataset& dataset) {
+// of all fields can be read, it can be probed; but one that was shown `before` is not replaced by
+// one that is not.
+Result<void> check_first_view(const data::Dataset& dataset, const data::Dataset* before) {
   const auto unfit = scene::why_not_shown(dataset);
-  return unfit ? Result<void>() : unfit.error();
+  if (!unfit) return unfit.error();
+  if (unfit->empty() || before == nullptr) return {};
+  const auto was = scene::why_not_shown(*before);
+  return was && was->empty() ? Result<void>(make_error(ErrorKind::out_of_memory, *unfit))
+                             : Result<void>();
 }
 
 // One bad file does not prevent serving the others, unless `strict`: it is listed as failed. The
@@ -196,8 +201,12 @@ int open_datasets(const std::vector<std::string>& named, bool strict, data::Stor
                          {"samples", info.grid.samples()},
                          {"fields", info.fields.size()},
                          {"steps", info.steps.size()}});
+    const auto unfit = scene::why_not_shown(**dataset);
     const std::string beyond = (*dataset)->beyond_limit(scene::fields_of({}, info));
-    if (!beyond.empty()) {
+    if (unfit && !unfit->empty()) {
+      log::warn("a dataset can be probed, but its default view is not shown",
+                {{"dataset", info.id}, {"fault", *unfit}});
+    } else if (!beyond.empty()) {
       log::warn("the memory limit may be too small for a dataset's first view",
                 {{"dataset", info.id}, {"fault", beyond.substr(2)}});
     }

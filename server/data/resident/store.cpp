@@ -154,7 +154,7 @@ struct Store::State {
     entry.dataset = std::make_shared<Dataset>(std::move(made->source), unique_id(wanted_id, key),
                                               budget, options.storage);
     auto usable = entry.dataset->charge_info();
-    if (usable && options.check) usable = options.check(*entry.dataset);
+    if (usable && options.check) usable = options.check(*entry.dataset, nullptr);
     if (usable && !failed_id.empty() && find_failed(failed_id) == nullptr) {
       usable = make_error(ErrorKind::not_found, "it is no longer listed");
     }
@@ -418,7 +418,7 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
       anew = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
                                        state_->options.storage);
       (void)anew->charge_info();  // it was resident before: keep it even if the budget refuses it
-      if (state_->options.check) usable = state_->options.check(*anew);
+      if (state_->options.check) usable = state_->options.check(*anew, old.get());
       lasts = !usable;
     }
     if (usable) {

@@ -39,7 +39,7 @@ struct StoreOptions {
       nullptr;  // replaces the store's own budget of bytes_max; shared with sources
   // A check that a dataset must pass to be listed or reopened; null: no check. Called under the
   // store's lock, so it must not call the store.
-  std::function<Result<void>(const Dataset&)> check = nullptr;
+  std::function<Result<void>(const Dataset&, const Dataset* before)> check = nullptr;
 };
 
 // All datasets of a process. Thread-safe.

@@ -142,7 +142,7 @@ TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
     ++opened;
     return open_file(location.members.front().path);
   };
-  options.check = [&](const Dataset& /*dataset*/) -> Result<void> {
+  options.check = [&](const Dataset& /*dataset*/, const Dataset* /*before*/) -> Result<void> {
     if (is_too_large) return make_error(ErrorKind::out_of_memory, "it needs 9 GiB");
     return {};
   };

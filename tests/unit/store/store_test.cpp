@@ -146,7 +146,7 @@ TEST(Store, RefusedDatasetStaysFailedUntilItPasses) {
   bool refuses = true;
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.check = [&](const Dataset& /*dataset*/) -> Result<void> {
+  options.check = [&](const Dataset& /*dataset*/, const Dataset* /*before*/) -> Result<void> {
     if (refuses) return make_error(ErrorKind::out_of_memory, "too large");
     return {};
   };
