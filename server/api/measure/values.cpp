@@ -361,8 +361,7 @@ Result<void> copy_pieces(const Subject& subject, const Selection& selection, std
   const std::array<int, 3> dims = subject.dataset->info().grid.dims();
   for (const Span& span : spans_of(selection.crop)) {
     const int apart = data::layers_apart(span.box, selection.stride[2], subject.field, dims);
-    for (const data::Box& piece :
-         data::pieces_of(span.box, apart, subject.field, dims, piece_values)) {
+    for (const data::Box& piece : data::pieces_of(span.box, apart, subject.field, piece_values)) {
       if (subject.cancel.cancelled()) {
         return make_error(ErrorKind::cancelled, "request cancelled");
       }

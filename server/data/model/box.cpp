@@ -139,14 +139,15 @@ double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
 }
 
 std::vector<Box> pieces_of(const Box& box, int layer_stride, const FieldInfo& field,
-                           const std::array<int, 3>& dims, std::size_t values_max) {
+                           std::size_t values_max) {
   std::array<int, 3> length = field.box_chunk;
   auto values = static_cast<double>(field.components.size());
   for (const int n : length) values *= n;
   for (std::size_t a = 0; a < 3; ++a) {
     if (a == 2 && layer_stride > length[2]) continue;
     const double fit = std::max(1.0, static_cast<double>(values_max) / values);
-    const int along = dims.at(a) / length.at(a) + 2;  // chunks, cut ones at both ends included
+    // Chunks of the box, cut ones at both ends included.
+    const int along = box.count.at(a) / length.at(a) + 2;
     const int chunks = static_cast<int>(std::min<double>(fit, along));
     length.at(a) *= chunks;
     values *= chunks;

@@ -46,6 +46,6 @@ double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
 // Boxes that hold every `layer_stride`-th layer of a box, in ascending order: of whole chunks, so
 // that none is decoded twice, and of at most `values_max` values of all components, or a chunk.
 std::vector<Box> pieces_of(const Box& box, int layer_stride, const FieldInfo& field,
-                           const std::array<int, 3>& dims, std::size_t values_max);
+                           std::size_t values_max);
 
 }  // namespace windsplat::data

@@ -123,7 +123,8 @@ TEST(Part, IsReadWhereItCostsAtMostHalfOfTheStep) {
   EXPECT_TRUE(f.dataset.reads_apart("f", 0, {small_box}));
   EXPECT_TRUE(f.dataset.reads_apart("f", 0, {{{0, 0, 0}, {128, 128, 40}}}));
   EXPECT_FALSE(f.dataset.reads_apart("f", 0, {{{0, 0, 0}, {128, 128, 41}}}));
-  EXPECT_TRUE(f.dataset.reads_apart("f", 0, {whole_box(large_dims)}, 2)) << "every other layer";
+  EXPECT_TRUE(f.dataset.reads_apart("f", 0, {whole_box(large_dims)}, 17)) << "every 17th layer";
+  EXPECT_FALSE(f.dataset.reads_apart("f", 0, {whole_box(large_dims)}, 16)) << "below 1 MiB";
   const Box half{{0, 0, 0}, {64, 128, 80}};
   EXPECT_TRUE(f.dataset.reads_apart("f", 0, {half}));
   EXPECT_FALSE(f.dataset.reads_apart("f", 0, {half, half})) << "together";

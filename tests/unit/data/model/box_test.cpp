@@ -176,7 +176,7 @@ TEST(Box, PiecesHoldEveryTakenLayerOnceInWholeChunks) {
     const std::size_t most = 1 + random() % 3000;
     std::set<BoxIndex> found;
     std::set<BoxIndex> decoded;  // chunks
-    for (const Box& piece : pieces_of(one.box, one.stride, one.field, one.dims, most)) {
+    for (const Box& piece : pieces_of(one.box, one.stride, one.field, most)) {
       ASSERT_TRUE(is_within(piece, one.dims));
       std::size_t chunk = 1;
       for (const int length : one.field.box_chunk) chunk *= static_cast<std::size_t>(length);
