@@ -133,7 +133,7 @@ class Climate final : public SampleSource {
   explicit Climate(const SampleSize& size);
 
  private:
-  void fill(std::size_t field, std::size_t step, Volume& volume) override {
+  void fill(std::size_t field, std::size_t step, const Box& /*whole*/, Volume& volume) override {
     const double hours = info_.steps[step].value;
     if (field == 0) {
       fill_wind(hours, volume);

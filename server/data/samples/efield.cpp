@@ -300,7 +300,7 @@ class ElectricField final : public SampleSource {
   }
 
  private:
-  void fill(std::size_t field, std::size_t step, Volume& volume) override {
+  void fill(std::size_t field, std::size_t step, const Box& /*whole*/, Volume& volume) override {
     if (field == 2) {
       fill_walls(volume);
       return;

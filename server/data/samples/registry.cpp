@@ -15,21 +15,25 @@ namespace {
 
 constexpr int dim_max = 4096;
 constexpr std::int64_t samples_max = std::int64_t{1} << 28;  // 3 GiB per vector field
+// Of samples that are computed by boxes, so that they need not fit in memory.
+constexpr std::int64_t samples_by_boxes_max = std::int64_t{1} << 36;
 constexpr int steps_max = 100000;
 
 struct Sample {
   const char* name;
   SampleSize size;
   std::unique_ptr<Source> (*make)(const SampleSize&);
+  std::int64_t samples_max = data::samples_max;
 };
 
 constexpr std::array<Sample, 3> samples = {{
-    {"tornado", tornado_size, make_tornado},
+    {"tornado", tornado_size, make_tornado, samples_by_boxes_max},
     {"climate", climate_size, make_climate},
     {"efield", efield_size, make_efield},
 }};
 
-Result<SampleSize> chosen_size(const SampleSize& own, std::array<int, 3> dims, int steps) {
+Result<SampleSize> chosen_size(const Sample& sample, std::array<int, 3> dims, int steps) {
+  const SampleSize& own = sample.size;
   SampleSize size = own;
   std::int64_t total = 1;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -41,8 +45,10 @@ Result<SampleSize> chosen_size(const SampleSize& own, std::array<int, 3> dims, i
     size.dims[a] = dims[a] == 0 ? own.dims[a] : dims[a];
     total *= size.dims[a];
   }
-  if (total > samples_max) {
-    return make_error(ErrorKind::too_large, "a sample has at most " + std::to_string(samples_max) +
+  if (total > sample.samples_max) {
+    return make_error(ErrorKind::too_large, std::string("the sample ") + sample.name +
+                                                " has at most " +
+                                                std::to_string(sample.samples_max) +
                                                 " grid points, not " + std::to_string(total));
   }
   if (steps < 0 || steps > steps_max) {
@@ -84,7 +90,7 @@ Result<std::unique_ptr<Source>> open_sample(const std::string& name, std::array<
   if (found == nullptr) {
     return make_error(ErrorKind::not_found, "no built-in sample \"" + printable(name) + "\"");
   }
-  auto size = chosen_size(found->size, dims, steps);
+  auto size = chosen_size(*found, dims, steps);
   if (!size) return size.error();
   return found->make(*size);
 }

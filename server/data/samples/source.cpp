@@ -55,12 +55,22 @@ SampleSource::SampleSource(const std::string& name, const std::string& title,
 }
 
 Result<Volume> SampleSource::read(std::size_t field, std::size_t step) {
+  return computed(field, step, whole_box(info_.grid.dims()));
+}
+
+Result<Volume> SampleSource::read_part(std::size_t field, std::size_t step, const Box& box) {
+  if (auto fine = check_box(box); !fine) return fine.error();
+  if (!info_.fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, box);
+  return computed(field, step, box);
+}
+
+Volume SampleSource::computed(std::size_t field, std::size_t step, const Box& box) {
   WINDSPLAT_CHECK(field < info_.fields.size() && step < info_.steps.size());
   Volume volume;
-  volume.dims = info_.grid.dims();
+  volume.dims = box.count;
   volume.components = static_cast<int>(info_.fields[field].components.size());
   volume.values = Samples(volume.samples() * static_cast<std::size_t>(volume.components));
-  fill(field, step, volume);
+  fill(field, step, box, volume);
   finish_volume(volume);
   return volume;
 }

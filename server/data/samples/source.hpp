@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/model/volume.hpp"
@@ -33,17 +34,22 @@ class SampleSource : public Source {
  public:
   [[nodiscard]] const DatasetInfo& info() const override { return info_; }
   Result<Volume> read(std::size_t field, std::size_t step) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
 
  protected:
   // `formula_version` is part of the digest: increment it whenever a formula changes.
   SampleSource(const std::string& name, const std::string& title, const SampleSize& size,
                int formula_version, std::string time_units);
 
-  // `volume` has its dimensions and components set and its values zeroed; finish_volume() is called
-  // afterwards.
-  virtual void fill(std::size_t field, std::size_t step, Volume& volume) = 0;
+  // Computes the samples of a box: of the whole, unless the field is read by boxes
+  // (FieldInfo::box_chunk). `volume` has the dimensions of the box and its components set and its
+  // values zeroed; finish_volume() is called afterwards.
+  virtual void fill(std::size_t field, std::size_t step, const Box& box, Volume& volume) = 0;
 
   DatasetInfo info_;
+
+ private:
+  Volume computed(std::size_t field, std::size_t step, const Box& box);
 };
 
 Axis sample_axis(std::string name, std::string standard_name, std::string units, AxisKind kind,

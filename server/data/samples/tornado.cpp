@@ -19,6 +19,7 @@
 //   by noise that rotates with the swirl.
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "server/data/samples/source.hpp"
 
@@ -77,6 +78,7 @@ class Tornado final : public SampleSource {
         sample_vector("wind", {"u", "v", "w"}, "m s-1", "wind"),
         sample_scalar("cloud", "1", "", "condensation in the funnel, 0 clear to 1 cloudy"),
         sample_scalar("vorticity", "s-1", "", "vertical vorticity of the swirl")};
+    for (FieldInfo& field : info_.fields) field.box_chunk = {1, 1, 1};
     for (int i = 0; i < size.steps; ++i) {
       const int seconds = static_cast<int>(step_s) * i;
       info_.steps.push_back({static_cast<double>(seconds), std::to_string(seconds) + " s"});
@@ -84,14 +86,18 @@ class Tornado final : public SampleSource {
   }
 
  private:
-  void fill(std::size_t field, std::size_t step, Volume& volume) override {
+  void fill(std::size_t field, std::size_t step, const Box& box, Volume& volume) override {
     const double time_s = info_.steps[step].value;
-    const auto& axes = info_.grid.axes;
+    const auto coordinates = [&](std::size_t axis) {
+      return std::span(info_.grid.axes.at(axis).coordinates)
+          .subspan(static_cast<std::size_t>(box.first.at(axis)),
+                   static_cast<std::size_t>(box.count.at(axis)));
+    };
     float* out = volume.values.data();
-    for (const double z : axes[2].coordinates) {
+    for (const double z : coordinates(2)) {
       const Level level = level_at(z, time_s);
-      for (const double y : axes[1].coordinates) {
-        for (const double x : axes[0].coordinates) {
+      for (const double y : coordinates(1)) {
+        for (const double x : coordinates(0)) {
           const double dx = x - level.axis_x;
           const double dy = y - level.axis_y;
           if (field == 0) {

@@ -20,6 +20,7 @@
 #include "server/base/whole_file.hpp"
 #include "server/data/cf/units.hpp"
 #include "server/data/formats/netcdf/file.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 
@@ -159,6 +160,18 @@ std::vector<std::size_t> chunk_of(const std::array<int, 3>& dims, bool has_time)
   const auto x = static_cast<std::size_t>(dims[0]);
   if (has_time) return {1, z, y, x};
   return {z, y, x};
+}
+
+// Whole chunks of the written file that take about 16 MiB; all levels where they are read together.
+int levels_at_once(const DatasetInfo& info, const FieldInfo& field) {
+  constexpr std::size_t values_max = std::size_t{4} << 20;
+  const auto [nx, ny, nz] = info.grid.dims();
+  if (!field.is_read_by_boxes()) return nz;
+  const std::size_t level =
+      static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * field.components.size();
+  const std::size_t chunk = chunk_of(info.grid.dims(), false)[0];
+  const std::size_t levels = std::max<std::size_t>(values_max / level / chunk, 1) * chunk;
+  return static_cast<int>(std::min(levels, static_cast<std::size_t>(nz)));
 }
 
 class Writer {
@@ -349,30 +362,33 @@ class Writer {
     if (!is_wanted) {
       return {};
     }
-    auto volume = source_.read(field, step);  // takes the library's lock itself if it needs it
-    if (!volume) {
-      return volume.error();
-    }
-    float* first = volume->values.data();
-    std::replace_if(
-        first, first + volume->values.size(), [](float v) { return std::isnan(v); }, fill_value);
-    for (const OutVariable& variable : variables_) {
-      if (variable.field != field) {
-        continue;
-      }
-      const float* values = volume->component(static_cast<int>(variable.component));
-      if (auto done = write_levels(variable, step, values); !done) {
-        return done;
+    const Box whole = whole_box(info_.grid.dims());
+    Box box = whole;
+    box.count[2] = levels_at_once(info_, info_.fields[field]);
+    for (; box.first[2] < whole.count[2]; box.first[2] += box.count[2]) {
+      box.count[2] = std::min(box.count[2], whole.count[2] - box.first[2]);
+      // Takes the library's lock itself if it needs it.
+      auto volume = box == whole ? source_.read(field, step) : source_.read_part(field, step, box);
+      if (!volume) return volume.error();
+      float* first = volume->values.data();
+      std::replace_if(
+          first, first + volume->values.size(), [](float v) { return std::isnan(v); }, fill_value);
+      for (const OutVariable& variable : variables_) {
+        if (variable.field != field) continue;
+        const float* values = volume->component(static_cast<int>(variable.component));
+        if (auto done = write_levels(variable, step, box, values); !done) return done;
       }
     }
     return {};
   }
 
-  // Writes the levels of one chunk at a time, so that cancellation is checked often.
-  Result<void> write_levels(const OutVariable& variable, std::size_t step, const float* values) {
-    const auto dims = info_.grid.dims();
-    const auto layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
-    const auto levels = static_cast<std::size_t>(dims[2]);
+  // Writes the levels of a box of whole levels, one chunk at a time, so that cancellation is
+  // checked often.
+  Result<void> write_levels(const OutVariable& variable, std::size_t step, const Box& box,
+                            const float* values) {
+    const auto layer =
+        static_cast<std::size_t>(box.count[0]) * static_cast<std::size_t>(box.count[1]);
+    const auto levels = static_cast<std::size_t>(box.count[2]);
     const std::vector<std::size_t> chunks = chunk_of(info_.grid.dims(), time_ >= 0);
     const std::size_t z = chunks.size() - 3;
     for (std::size_t first = 0; first < levels; first += chunks[z]) {
@@ -381,9 +397,9 @@ class Writer {
       }
       std::vector<std::size_t> start(chunks.size(), 0);
       std::vector<std::size_t> count{std::min(chunks[z], levels - first),
-                                     static_cast<std::size_t>(dims[1]),
-                                     static_cast<std::size_t>(dims[0])};
-      start[z] = first;
+                                     static_cast<std::size_t>(box.count[1]),
+                                     static_cast<std::size_t>(box.count[0])};
+      start[z] = static_cast<std::size_t>(box.first[2]) + first;
       if (time_ >= 0) {
         start[0] = step;
         count.insert(count.begin(), 1);

@@ -66,7 +66,9 @@ TEST(Samples, RefuseUnknownNamesAndSizes) {
   EXPECT_EQ(open_sample("hurricane").error().kind, ErrorKind::not_found);
   EXPECT_EQ(open_sample("tornado", {-1, 8, 8}).error().kind, ErrorKind::invalid);
   EXPECT_EQ(open_sample("tornado", {5000, 8, 8}).error().kind, ErrorKind::invalid);
-  EXPECT_EQ(open_sample("tornado", {4096, 4096, 4096}).error().kind, ErrorKind::too_large);
+  const Error large = open_sample("climate", {4096, 4096, 17}).error();
+  EXPECT_EQ(large.kind, ErrorKind::too_large);
+  EXPECT_EQ(large.message, "the sample climate has at most 268435456 grid points, not 285212672");
   EXPECT_EQ(open_sample("tornado", {8, 8, 8}, -2).error().kind, ErrorKind::invalid);
 }
 
@@ -103,6 +105,35 @@ TEST(Samples, AreReproducibleAndChangeWithTheStep) {
     EXPECT_EQ(first->read(1, 1)->values, later.values) << name;
     EXPECT_NE(a.values, first->read(0, 1)->values) << name;
   }
+}
+
+TEST(Samples, PartsHaveTheValuesOfTheWhole) {
+  const Box box{{3, 1, 5}, {4, 7, 2}};
+  for (const std::string& name : sample_names()) {
+    auto source = sample(name, {9, 8, 7});
+    for (std::size_t f = 0; f < source->info().fields.size(); ++f) {
+      const auto part = source->read_part(f, 1, box);
+      ASSERT_TRUE(part);
+      EXPECT_EQ(part->values, cut(*source->read(f, 1), box).values) << name << " field " << f;
+      EXPECT_EQ(source->read_part(f, 1, {{3, 1, 6}, {4, 7, 2}}).error().kind, ErrorKind::invalid);
+    }
+  }
+}
+
+// 768 GiB for each step of the wind.
+TEST(Tornado, PartsOfAnySizeAreComputedWithoutTheWhole) {
+  auto large = sample("tornado", {4096, 4096, 4096});
+  ASSERT_TRUE(large->info().fields[0].is_read_by_boxes());
+  const auto corner = large->read_part(0, 0, {{4092, 4090, 4095}, {4, 6, 1}});
+  ASSERT_TRUE(corner);
+  EXPECT_EQ(corner->dims, (std::array<int, 3>{4, 6, 1}));
+  // Every third of 4095 cells has the centre of one of 1365.
+  auto third = sample("tornado", {1365, 1365, 1365});
+  auto all = sample("tornado", {4095, 4095, 4095});
+  const auto coarse = third->read_part(0, 0, {{700, 701, 702}, {1, 1, 1}});
+  const auto fine = all->read_part(0, 0, {{2101, 2104, 2107}, {1, 1, 1}});
+  ASSERT_TRUE(coarse && fine);
+  for (const int c : {0, 1, 2}) EXPECT_FLOAT_EQ(*fine->component(c), *coarse->component(c));
 }
 
 TEST(Tornado, AirTurnsCounterClockwiseAndRisesEverywhere) {

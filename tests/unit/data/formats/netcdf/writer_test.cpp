@@ -191,6 +191,13 @@ TEST(NetcdfWriter, RoundTripOfTheBuiltInSamples) {
   }
 }
 
+// A wind of 18 MiB, of whose 24 levels 16 are read at once.
+TEST(NetcdfWriter, RoundTripOfFieldsReadByBoxes) {
+  auto sample = open_sample("tornado", {256, 256, 24}, 1);
+  ASSERT_TRUE(sample) << sample.error().message;
+  round_trip(**sample);
+}
+
 TEST(NetcdfWriter, StepsKeepTheirDates) {
   FakeSource source(
       make_info({axis("lon", AxisKind::longitude, {0, 90}),
