@@ -28,6 +28,7 @@ CONFINED = [
     ("nlohmann/", r"nlohmann/",
      r"protocol/((animation|view)/)?codec\w*\.[ch]pp|"
      r"server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
+     r"server/data/formats/zarr/write/\w+\.[ch]pp|server/convert/\w+\.[ch]pp|"
      r"server/data/formats/plain/json_text\.[ch]pp|server/api/documents/\w+\.[ch]pp|tests/.*"),
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
     ("PROJ", r"proj\.h",

@@ -1,4 +1,5 @@
-// Reduces a volume to a coarser level: two values of scalars, drawn samples of vectors.
+// Reduces a volume, or a box of one, to a coarser level: two values or means of scalars, drawn
+// samples or mean magnitudes of vectors.
 #pragma once
 
 #include <array>
@@ -15,8 +16,9 @@ namespace windsplat::data {
 // keeps magnitudes and directions, and in expectation any sum over the samples (stochastic
 // simplification: Cook, Halstead, Planck, Ryu, SIGGRAPH 2007). The draw is among the places of a
 // whole group, also where the last group of an axis has fewer samples: a sample has the same
-// probability in every group. With a stride, the draw is among the samples of strided kernels.
-enum class Reduction { two_values, drawn };
+// probability in every group. With a stride, the draw is among the samples of strided kernels. mean
+// and mean_magnitude: of the samples that are not masked, for programs that know no other levels.
+enum class Reduction { two_values, drawn, mean, mean_magnitude };
 
 // The sample of the n-th strided kernel along an axis: the middle one (the lower of two) of
 // `stride` samples, at the end of the axis of the remaining ones. n stride < samples.
@@ -33,20 +35,29 @@ inline int drawn_places(int halvings, int stride) {
 }
 
 // halvings[a] = h: 2^h samples along axis a become one; the last group may be smaller.
-// widths[a]: cell widths along an axis, in any unit, since only ratios matter; only two values of
-// an axis that is halved need them.
+// widths[a]: cell widths along an axis of the data, in any unit, since only ratios matter; only two
+// values and means of an axis that is halved need them.
+// first, data_dims: of a volume that is a box of the data: the index of its first sample, a
+// multiple of 2^halvings, and the dimensions of the data. The box ends at such a multiple or with
+// the data, and is reduced to the bits of the same box of the whole. data_dims 0: the whole.
 struct Coarsening {
   std::array<int, 3> halvings{0, 0, 0};
   std::array<std::vector<double>, 3> widths;
   Reduction reduction = Reduction::two_values;
-  int stride = 1;  // of kernels, in samples; drawn only
+  int stride = 1;  // of kernels, in samples; drawn only. 2^halvings: the middle of each kernel
+  std::array<int, 3> first{0, 0, 0};
+  std::array<int, 3> data_dims{0, 0, 0};
 };
 
 // Number of samples along an axis after `halvings` halvings.
 int halved(int samples, int halvings);
 
 // two_values: of a scalar; the samples are weighted by the volumes of their cells, so that
-// integrals over space are preserved. O(samples), two passes over the source.
+// integrals over space are preserved. O(samples), two passes over the source. The range is that of
+// the source.
+//
+// mean: of a scalar, weighted likewise; mean_magnitude: of a vector, a scalar. Masked where all
+// samples of the group are. O(samples), one pass.
 //
 // drawn: a sample of each group with all its components, masked if that sample is, if the place
 // drawn lies beyond the last sample, or if the group has no sample of a strided kernel there. The
@@ -58,7 +69,8 @@ Volume coarsen(const Volume& fine, const Coarsening& how);
 int reduced_components(int components, Reduction reduction);
 
 // Cache key of a coarser volume: equal keys have equal reductions and weights. Contains the
-// normalised weights, rounded as in coarsen(), so it does not depend on the unit of the widths.
+// normalised weights, rounded as in coarsen(), so it does not depend on the unit of the widths. Of
+// the whole: without the box.
 std::string key_of(const Coarsening& how);
 
 }  // namespace windsplat::data
