@@ -24,7 +24,7 @@ struct WrittenFile {
 // Writes the chunks of a region of an array (WrittenArray::region): into one file, a shard with its
 // index at the end, or a file for each chunk if the store has none. Files that exist are replaced.
 // A file is removed again unless close() succeeds. Errors name the file: out_of_memory (the disk is
-// full), internal.
+// full), internal. After an error the writer can only be destroyed.
 class ShardWriter {
  public:
   // `place`: of the region among those of the array, along each dimension. The array must outlive
@@ -42,23 +42,26 @@ class ShardWriter {
   Result<void> add(std::size_t chunk, std::span<const double> items);
   Result<void> add(std::size_t chunk, std::span<const std::uint32_t> items);
 
-  // Writes the index and syncs the files, but not their folders. The files are in the order of the
-  // chunks; none without chunks, of which an older file is removed.
+  // Writes the index and syncs the files, but not their folders. Gives the files in the order of
+  // the calls; none if there is no chunk.
   Result<std::vector<WrittenFile>> close();
 
  private:
-  Result<void> add_bytes(std::size_t chunk, std::span<const unsigned char> items);
-  Result<void> open(const std::string& path_in_store);
+  template <class T>
+  Result<void> add_items(std::size_t chunk, std::span<const T> items);
+  [[nodiscard]] std::string path_of(std::size_t chunk) const;
+  Result<void> open(const std::string& path);
   Result<void> append(std::span<const unsigned char> bytes);
   Result<void> finish_file();
 
   std::filesystem::path store_;
   const WrittenArray* array_;
   std::vector<std::size_t> place_;
-  std::vector<Span> index_;         // of the shard, by chunk
-  std::vector<WrittenFile> files_;  // the last one may be open
+  std::vector<std::size_t> chunks_;  // of the region, along each dimension
+  std::vector<Span> index_;          // by chunk; of chunks that are files without meaning
+  std::vector<WrittenFile> files_;   // the last one may be open
   int descriptor_ = -1;
-  bool closed_ = false;
+  bool is_closed_ = false;
 };
 
 // Writes a small array whose items are given as a whole. Errors: those of ShardWriter.
