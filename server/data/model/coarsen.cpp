@@ -1,7 +1,7 @@
-// Two values of each group by its weighted mean, and drawn samples. A row of groups accumulates its
-// fine rows at full width, in loops without branches over consecutive memory, and is then added up
-// along x. Coarse layers are independent of each other; large volumes are reduced by several
-// threads.
+// Two values of each group by its weighted mean, means, and drawn samples. A row of groups
+// accumulates its fine rows at full width, in loops without branches over consecutive memory, and
+// is then added up along x. Coarse layers are independent of each other; large volumes are reduced
+// by several threads.
 #include "server/data/model/coarsen.hpp"
 
 #include <algorithm>
@@ -49,6 +49,21 @@ std::vector<float> shares(const std::vector<double>& widths, int samples, int ha
   return out;
 }
 
+// The dimensions of the data of which the volume is a box.
+std::array<int, 3> data_dims_of(const Volume& fine, const Coarsening& how) {
+  if (how.data_dims == std::array{0, 0, 0}) {
+    WINDSPLAT_CHECK((how.first == std::array{0, 0, 0}));
+    return fine.dims;
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int group = 1 << how.halvings[a];
+    const int end = how.first[a] + fine.dims[a];
+    WINDSPLAT_CHECK(how.first[a] >= 0 && how.first[a] % group == 0);
+    WINDSPLAT_CHECK(end == how.data_dims[a] || (end < how.data_dims[a] && end % group == 0));
+  }
+  return how.data_dims;
+}
+
 // Masks of all bits or none, since compilers do not vectorise choices between floats that may trap.
 std::int32_t if_there(float v) {
   constexpr std::int32_t magnitude = 0x7fffffff;
@@ -91,9 +106,10 @@ void add_row(const float* values, float w, Sums& sums) {
 
 // What a thread computes of a row of groups.
 struct RowOfGroups {
-  Sums all, low, high;      // full width
-  std::vector<float> mean;  // of the group of every sample of a row; NaN: all are masked
-  std::int64_t masked = 0;  // groups
+  Sums all, low, high;            // full width
+  std::vector<float> magnitudes;  // of the samples of a row of a vector
+  std::vector<float> mean;        // of the group of every sample of a row; NaN: all are masked
+  std::int64_t masked = 0;        // groups
 };
 
 // The same for the samples below the mean of their group, and for the others. No two of the six
@@ -113,18 +129,21 @@ void add_halves(const float* __restrict values, const float* __restrict mean, st
   }
 }
 
-// Two values of the groups of a scalar.
-class TwoValueReducer {
+// Two values or means of the groups of a scalar, and mean magnitudes of vectors.
+class WeightedReducer {
  public:
-  TwoValueReducer(const Volume& fine, const Coarsening& how)
-      : fine_(fine), halvings_(how.halvings) {
-    WINDSPLAT_CHECK(fine.components == 1);
+  WeightedReducer(const Volume& fine, const Coarsening& how)
+      : fine_(fine), halvings_(how.halvings), reduction_(how.reduction) {
+    WINDSPLAT_CHECK((fine.components == 1) == (reduction_ != Reduction::mean_magnitude));
+    const std::array<int, 3> data_dims = data_dims_of(fine, how);
     for (std::size_t a = 0; a < 3; ++a) {
-      weights_[a] = shares(how.widths[a], fine.dims[a], halvings_[a]);
+      const std::vector<float> all = shares(how.widths[a], data_dims[a], halvings_[a]);
+      const auto first = all.begin() + how.first[a];
+      weights_[a].assign(first, first + fine.dims[a]);
       coarse_.dims[a] = halved(fine.dims[a], halvings_[a]);
     }
-    coarse_.components = TwoValues::components;
-    coarse_.values = Samples(coarse_.samples() * TwoValues::components);
+    coarse_.components = reduced_components(fine.components, reduction_);
+    coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(coarse_.components));
   }
 
   Volume run() {
@@ -132,8 +151,12 @@ class TwoValueReducer {
     std::vector<RowOfGroups> rows(pool->size());
     pool->run(static_cast<std::size_t>(coarse_.dims[2]),
               [&](std::size_t k, unsigned worker) { reduce_layer(k, rows[worker]); });
-    for (const RowOfGroups& row : rows) coarse_.masked += row.masked;
-    coarse_.range = fine_.range;
+    if (reduction_ == Reduction::two_values) {
+      for (const RowOfGroups& row : rows) coarse_.masked += row.masked;
+      coarse_.range = fine_.range;
+    } else {
+      finish_volume(coarse_);
+    }
     return std::move(coarse_);
   }
 
@@ -142,13 +165,18 @@ class TwoValueReducer {
     const auto width = static_cast<std::size_t>(coarse_.dims[0]);
     const auto rows = static_cast<std::size_t>(coarse_.dims[1]);
     for (std::size_t j = 0; j < rows; ++j) {
+      const std::size_t to = (k * rows + j) * width;
       find_means(j, k, row);
-      divide(j, k, row);
-      write((k * rows + j) * width, row);
+      if (reduction_ == Reduction::two_values) {
+        divide(j, k, row);
+        write(to, row);
+      } else {
+        write_means(to, row);
+      }
     }
   }
 
-  // Calls visit(row of samples, its weight) for every fine row of a coarse row.
+  // Calls visit(first sample of a row, weight of the row) for every fine row of a coarse row.
   template <class Visit>
   void each_row(std::size_t j, std::size_t k, const Visit& visit) const {
     const Group y = group_at(j, halvings_[1], fine_.dims[1]);
@@ -157,16 +185,29 @@ class TwoValueReducer {
     const auto layer = row * static_cast<std::size_t>(fine_.dims[1]);
     for (std::size_t b = z.first; b < z.first + z.count; ++b) {
       for (std::size_t a = y.first; a < y.first + y.count; ++a) {
-        visit(fine_.values.data() + b * layer + a * row, weights_[1][a] * weights_[2][b]);
+        visit(b * layer + a * row, weights_[1][a] * weights_[2][b]);
       }
     }
+  }
+
+  // The values of a row of samples, or their magnitudes.
+  const float* values_at(std::size_t from, RowOfGroups& row) const {
+    if (reduction_ != Reduction::mean_magnitude) return fine_.values.data() + from;
+    const auto samples = static_cast<std::size_t>(fine_.dims[0]);
+    const std::array<const float*, 3> components{
+        fine_.component(0), fine_.component(1), fine_.component(std::min(2, fine_.components - 1))};
+    row.magnitudes.resize(samples);
+    for (std::size_t i = 0; i < samples; ++i) {
+      row.magnitudes[i] = magnitude(components.data(), fine_.components, from + i);
+    }
+    return row.magnitudes.data();
   }
 
   void find_means(std::size_t j, std::size_t k, RowOfGroups& row) const {
     const auto samples = static_cast<std::size_t>(fine_.dims[0]);
     row.all.reset(samples);
     row.mean.resize(samples);
-    each_row(j, k, [&](const float* values, float w) { add_row(values, w, row.all); });
+    each_row(j, k, [&](std::size_t from, float w) { add_row(values_at(from, row), w, row.all); });
     for (std::size_t i = 0; i < static_cast<std::size_t>(coarse_.dims[0]); ++i) {
       const Group x = group_at(i, halvings_[0], fine_.dims[0]);
       float sum = 0;
@@ -184,10 +225,16 @@ class TwoValueReducer {
     const auto samples = static_cast<std::size_t>(fine_.dims[0]);
     row.low.reset(samples);
     row.high.reset(samples);
-    each_row(j, k, [&](const float* values, float w) {
-      add_halves(values, row.mean.data(), samples, w, row.low.sum.data(), row.low.weight.data(),
-                 row.high.sum.data(), row.high.weight.data());
+    each_row(j, k, [&](std::size_t from, float w) {
+      add_halves(fine_.values.data() + from, row.mean.data(), samples, w, row.low.sum.data(),
+                 row.low.weight.data(), row.high.sum.data(), row.high.weight.data());
     });
+  }
+
+  void write_means(std::size_t to, const RowOfGroups& row) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(coarse_.dims[0]); ++i) {
+      coarse_.values[to + i] = row.mean[group_at(i, halvings_[0], fine_.dims[0]).first];
+    }
   }
 
   void write(std::size_t to, RowOfGroups& row) {
@@ -220,6 +267,7 @@ class TwoValueReducer {
 
   const Volume& fine_;
   std::array<int, 3> halvings_;
+  Reduction reduction_;
   std::array<std::vector<float>, 3> weights_;
   Volume coarse_;
 };
@@ -238,11 +286,15 @@ std::optional<std::size_t> drawn_sample(const Group& group, int halvings, int st
   return static_cast<std::size_t>(sample);
 }
 
-// Copies drawn samples, group by group. Hashes are of the group's indices alone.
+// Copies drawn samples, group by group. Hashes are of the group's indices in the data alone.
 class Drawer {
  public:
   Drawer(const Volume& fine, const Coarsening& how)
-      : fine_(fine), halvings_(how.halvings), stride_(how.stride) {
+      : fine_(fine),
+        halvings_(how.halvings),
+        stride_(how.stride),
+        first_(how.first),
+        data_dims_(data_dims_of(fine, how)) {
     for (std::size_t a = 0; a < 3; ++a) coarse_.dims[a] = halved(fine.dims[a], halvings_[a]);
     coarse_.components = fine.components;
     coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(fine.components));
@@ -272,17 +324,19 @@ class Drawer {
     }
   }
 
-  // Empty: no sample at the place that is drawn.
-  [[nodiscard]] std::optional<std::size_t> drawn(const std::array<int, 3>& group) const {
+  // `group`: within the volume. Empty: no sample at the place that is drawn.
+  [[nodiscard]] std::optional<std::size_t> drawn(std::array<int, 3> group) const {
+    for (std::size_t a = 0; a < 3; ++a) group[a] += first_[a] >> halvings_[a];
     const auto hash =
         pcg3d({static_cast<std::uint32_t>(group[0]), static_cast<std::uint32_t>(group[1]),
                static_cast<std::uint32_t>(group[2])});
     std::size_t at = 0;
     for (std::size_t a = 3; a-- > 0;) {
-      const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], fine_.dims[a]);
-      const auto sample = drawn_sample(along, halvings_[a], stride_, fine_.dims[a], hash[a]);
+      const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], data_dims_[a]);
+      const auto sample = drawn_sample(along, halvings_[a], stride_, data_dims_[a], hash[a]);
       if (!sample) return std::nullopt;
-      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample;
+      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample -
+           static_cast<std::size_t>(first_[a]);
     }
     return at;
   }
@@ -290,6 +344,7 @@ class Drawer {
   const Volume& fine_;
   std::array<int, 3> halvings_;
   int stride_;
+  std::array<int, 3> first_, data_dims_;
   Volume coarse_;
 };
 
@@ -302,16 +357,20 @@ int halved(int samples, int halvings) {
 
 Volume coarsen(const Volume& fine, const Coarsening& how) {
   if (how.reduction == Reduction::drawn) return Drawer(fine, how).run();
-  return TwoValueReducer(fine, how).run();
+  return WeightedReducer(fine, how).run();
 }
 
 int reduced_components(int components, Reduction reduction) {
-  return reduction == Reduction::two_values ? TwoValues::components : components;
+  if (reduction == Reduction::drawn) return components;
+  return reduction == Reduction::two_values ? TwoValues::components : 1;
 }
 
 std::string key_of(const Coarsening& how) {
-  std::string key = "two values";
-  if (how.reduction == Reduction::drawn) key = "drawn " + std::to_string(how.stride) + ' ';
+  std::string key = how.reduction == Reduction::two_values ? "two values"
+                    : how.reduction == Reduction::mean     ? "mean"
+                    : how.reduction == Reduction::drawn
+                        ? "drawn " + std::to_string(how.stride) + ' '
+                        : "mean magnitude";
   for (std::size_t a = 0; a < 3; ++a) {
     key += std::to_string(how.halvings[a]) + ':';
     if (how.halvings[a] == 0 || how.reduction == Reduction::drawn) continue;
