@@ -41,6 +41,7 @@ inline constexpr const char* longitude_name = "longitude";
 inline constexpr const char* latitude_name = "latitude";
 WrittenAttributes longitude_attributes();
 WrittenAttributes latitude_attributes();
+// Of heights as Ground has them, on land, or of their opposites, the depths of a sea floor.
 WrittenAttributes ground_attributes(const Ground& ground);
 
 // units, standard_name, long_name or windsplat_vector, which names the vector and the component.

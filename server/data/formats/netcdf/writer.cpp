@@ -18,7 +18,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/base/whole_file.hpp"
-#include "server/data/cf/units.hpp"
+#include "server/data/cf/written/attributes.hpp"
 #include "server/data/formats/netcdf/file.hpp"
 #include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
@@ -32,10 +32,7 @@ constexpr int deflate_level = 1;  // higher levels are much slower for little ga
 constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
 constexpr float fill_value = NC_FILL_FLOAT;
 
-struct OutVariable {
-  std::string name;
-  std::size_t field = 0;      // index of the field whose volume contains it
-  std::size_t component = 0;  // index of its array within that volume
+struct OutVariable : cf::WrittenVariable {
   int id = -1;
 };
 
@@ -51,94 +48,13 @@ Result<void> call(const char* what, Call&& library_call) {
   return {};
 }
 
-int put_text(int ncid, int variable, const char* name, const std::string& text) {
-  return text.empty() ? NC_NOERR : nc_put_att_text(ncid, variable, name, text.size(), text.c_str());
-}
-
-struct AxisWords {
-  const char* letter;
-  std::string standard_name;
-  std::string units;
-  std::string positive;
-};
-
-// Attributes of an axis, with those of CF where it has none.
-AxisWords words_of(const Axis& axis, std::size_t which) {
-  constexpr std::array<const char*, 3> axis_letters{"X", "Y", "Z"};
-  AxisWords words{axis_letters.at(which), axis.standard_name, axis.units, ""};
-  const auto silent = [&](const char* name, const char* units) {
-    words.standard_name = words.standard_name.empty() ? name : words.standard_name;
-    words.units = words.units.empty() ? units : words.units;
-  };
-  const bool falls =
-      axis.coordinates.size() > 1 && axis.coordinates.back() < axis.coordinates.front();
-  switch (axis.kind) {
-    case AxisKind::longitude:
-      silent("longitude", "degrees_east");
-      break;
-    case AxisKind::latitude:
-      silent("latitude", "degrees_north");
-      break;
-    case AxisKind::pressure:
-      silent("air_pressure", "hPa");
-      words.positive = "down";
-      break;
-    case AxisKind::height:
-      silent("height", "m");
-      words.positive = "up";
-      break;
-    case AxisKind::depth:
-      silent("depth", "m");
-      words.positive = "down";
-      break;
-    case AxisKind::level:
-      silent("", "level");
-      words.positive = falls ? "down" : "up";
-      break;
-    case AxisKind::cartesian:
-      break;
+int put_texts(int ncid, int variable, const cf::WrittenAttributes& attributes) {
+  int status = NC_NOERR;
+  for (const auto& [name, text] : attributes) {
+    if (status != NC_NOERR) break;
+    status = nc_put_att_text(ncid, variable, name.c_str(), text.size(), text.c_str());
   }
-  return words;
-}
-
-std::string component_standard_name(const DatasetInfo& info, const FieldInfo& field,
-                                    std::size_t component) {
-  if (field.kind == FieldKind::scalar) {
-    return field.standard_name;
-  }
-  if (field.name != "wind") {
-    return {};
-  }
-  const bool on_globe = info.grid.axes[0].kind == AxisKind::longitude;
-  if (component == 0) {
-    return on_globe ? "eastward_wind" : "x_wind";
-  }
-  if (component == 1) {
-    return on_globe ? "northward_wind" : "y_wind";
-  }
-  const bool is_omega = pascals_per_second_in(field.component_units.at(2)).has_value();
-  return std::string(is_omega ? omega_name : "upward_air_velocity");
-}
-
-// Lists every variable of every field once: components of vectors, then the remaining scalars.
-std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
-  std::vector<OutVariable> out;
-  for (const FieldKind kind : {FieldKind::vector, FieldKind::scalar}) {
-    for (std::size_t f = 0; f < info.fields.size(); ++f) {
-      if (info.fields[f].kind != kind || info.fields[f].derived) {
-        continue;
-      }
-      for (std::size_t c = 0; c < info.fields[f].components.size(); ++c) {
-        const std::string& name = info.fields[f].components[c];
-        const bool is_planned = std::any_of(out.begin(), out.end(),
-                                            [&](const OutVariable& v) { return v.name == name; });
-        if (!is_planned) {
-          out.push_back({name, f, c, -1});
-        }
-      }
-    }
-  }
-  return out;
+  return status;
 }
 
 // Replaces "HDF error" with an error of a full disk if there is no space left.
@@ -242,57 +158,41 @@ class Writer {
   }
 
   int define() {
-    then([&] { return put_text(ncid_, NC_GLOBAL, "Conventions", "CF-1.8"); });
-    then([&] { return put_text(ncid_, NC_GLOBAL, "title", info_.title); });
-    then([&] {
-      return put_text(ncid_, NC_GLOBAL, "source",
-                      std::string("windsplat ") + WINDSPLAT_VERSION + ", " + info_.source);
-    });
+    then([&] { return put_texts(ncid_, NC_GLOBAL, cf::dataset_attributes(info_)); });
     define_time();
     for (std::size_t which = 3; which-- > 0;) {
       define_axis(which);
     }
-    variables_ = plan_variables(info_);
-    for (OutVariable& variable : variables_) {
-      define_variable(variable);
+    for (cf::WrittenVariable& variable : cf::written_variables(info_)) {
+      define_variable(variables_.emplace_back(OutVariable{std::move(variable)}));
     }
     then([&] { return nc_enddef(ncid_); });
     return status_;
   }
 
-  // A time dimension is written only if the data have times.
   void define_time() {
-    if (info_.steps.size() < 2 && info_.time_units.empty()) {
+    if (!cf::has_times(info_)) {
       return;
     }
     int dimension = -1;
     then([&] { return nc_def_dim(ncid_, "time", info_.steps.size(), &dimension); });
     then([&] { return nc_def_var(ncid_, "time", NC_DOUBLE, 1, &dimension, &time_); });
-    then([&] { return put_text(ncid_, time_, "axis", "T"); });
-    then([&] { return put_text(ncid_, time_, "standard_name", "time"); });
-    then([&] { return put_text(ncid_, time_, "units", info_.time_units); });
-    then([&] { return put_text(ncid_, time_, "calendar", info_.time_calendar); });
+    then([&] { return put_texts(ncid_, time_, cf::time_attributes(info_)); });
     dimensions_.push_back(dimension);
   }
 
   void define_axis(std::size_t which) {
-    constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
     const Axis& axis = info_.grid.axes.at(which);
-    const std::string name = axis.name.empty() ? known_names.at(which) : axis.name;
-    const AxisWords words = words_of(axis, which);
+    const std::string name = cf::axis_name(info_, which);
     int dimension = -1;
     int& id = axes_.at(which);
     then([&] { return nc_def_dim(ncid_, name.c_str(), axis.coordinates.size(), &dimension); });
     then([&] { return nc_def_var(ncid_, name.c_str(), NC_DOUBLE, 1, &dimension, &id); });
-    then([&] { return put_text(ncid_, id, "axis", words.letter); });
-    then([&] { return put_text(ncid_, id, "standard_name", words.standard_name); });
-    then([&] { return put_text(ncid_, id, "units", words.units); });
-    then([&] { return put_text(ncid_, id, "positive", words.positive); });
+    then([&] { return put_texts(ncid_, id, cf::axis_attributes(axis, which)); });
     dimensions_.push_back(dimension);
   }
 
   void define_variable(OutVariable& variable) {
-    const FieldInfo& field = info_.fields.at(variable.field);
     const std::vector<std::size_t> chunks = chunk_of(info_.grid.dims(), time_ >= 0);
     int& id = variable.id;
     then([&] {
@@ -302,22 +202,7 @@ class Writer {
     then([&] { return nc_def_var_chunking(ncid_, id, NC_CHUNKED, chunks.data()); });
     then([&] { return nc_def_var_deflate(ncid_, id, 1, 1, deflate_level); });
     then([&] { return nc_def_var_fill(ncid_, id, NC_FILL, &fill_value); });
-    const std::string units = variable.component < field.component_units.size()
-                                  ? field.component_units[variable.component]
-                                  : field.units;
-    then([&] { return put_text(ncid_, id, "units", units); });
-    then([&] {
-      return put_text(ncid_, id, "standard_name",
-                      component_standard_name(info_, field, variable.component));
-    });
-    if (field.kind == FieldKind::scalar) {
-      then([&] { return put_text(ncid_, id, "long_name", field.long_name); });
-    } else {
-      then([&] {
-        return put_text(ncid_, id, "windsplat_vector",
-                        field.name + ' ' + std::to_string(variable.component));
-      });
-    }
+    then([&] { return put_texts(ncid_, id, cf::variable_attributes(info_, variable)); });
   }
 
   int write_coordinates() {
