@@ -38,6 +38,12 @@ std::string component_standard_name(const DatasetInfo& info, const FieldInfo& fi
   return std::string(is_omega ? omega_name : "upward_air_velocity");
 }
 
+void add_coordinates(const DatasetInfo& info, WrittenAttributes& to) {
+  if (!info.grid.columns) return;
+  const auto names = position_names(info);
+  to.emplace_back("coordinates", names[0] + ' ' + names[1]);
+}
+
 std::string component_units(const FieldInfo& field, std::size_t component) {
   return component < field.component_units.size() ? field.component_units[component] : field.units;
 }
@@ -128,6 +134,22 @@ WrittenAttributes axis_attributes(const Axis& axis, std::size_t which) {
                      {"positive", positive}});
 }
 
+std::array<std::string, 2> position_names(const DatasetInfo& info) {
+  const std::vector<WrittenVariable> variables = written_variables(info);
+  const auto is_taken = [&](const std::string& name) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (axis_name(info, a) == name) return true;
+    }
+    return std::any_of(variables.begin(), variables.end(),
+                       [&](const WrittenVariable& v) { return v.name == name; });
+  };
+  std::array<std::string, 2> out{longitude_name, latitude_name};
+  for (std::string& name : out) {
+    while (is_taken(name)) name += "_of_columns";
+  }
+  return out;
+}
+
 WrittenAttributes longitude_attributes() {
   return with_texts({{"standard_name", "longitude"}, {"units", "degrees_east"}});
 }
@@ -155,9 +177,7 @@ WrittenAttributes variable_attributes(const DatasetInfo& info, const WrittenVari
 
 WrittenAttributes placed_attributes(const DatasetInfo& info, const WrittenVariable& variable) {
   WrittenAttributes out = variable_attributes(info, variable);
-  if (info.grid.columns) {
-    out.emplace_back("coordinates", std::string(longitude_name) + ' ' + latitude_name);
-  }
+  add_coordinates(info, out);
   return out;
 }
 
@@ -171,9 +191,7 @@ WrittenAttributes mean_attributes(const DatasetInfo& info, const WrittenVariable
     out = with_texts({{"units", field.units},
                       {"standard_name", is_wind ? "wind_speed" : ""},
                       {"long_name", "magnitude of " + field.name}});
-    if (info.grid.columns) {
-      out.emplace_back("coordinates", std::string(longitude_name) + ' ' + latitude_name);
-    }
+    add_coordinates(info, out);
   }
   out.emplace_back("cell_methods", "area: mean");
   return out;

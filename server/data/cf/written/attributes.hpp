@@ -2,6 +2,7 @@
 // files and Zarr stores have them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -37,8 +38,10 @@ std::string axis_name(const DatasetInfo& info, std::size_t which);
 WrittenAttributes axis_attributes(const Axis& axis, std::size_t which);
 
 // Of the positions of columns (Grid::columns), variables (y, x) in degrees, and of the ground.
+// Names of the two: these, followed by "_of_columns" where an axis or a field has that name.
 inline constexpr const char* longitude_name = "longitude";
 inline constexpr const char* latitude_name = "latitude";
+std::array<std::string, 2> position_names(const DatasetInfo& info);
 WrittenAttributes longitude_attributes();
 WrittenAttributes latitude_attributes();
 // Of heights as Ground has them, on land, or of their opposites, the depths of a sea floor.

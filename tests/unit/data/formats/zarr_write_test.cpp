@@ -4,13 +4,16 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/data/formats/zarr/crc32c.hpp"
@@ -121,7 +124,8 @@ std::vector<WrittenArray> some_arrays(StoreFormat format) {
   return out;
 }
 
-// Absent in the second chunk along the first dimension, and in the first of the others.
+// Absent in the second chunk along the first dimension, and in the first of the others, and every
+// fifth item elsewhere.
 template <class T>
 std::vector<T> items_of(const WrittenArray& array) {
   std::vector<T> out;
@@ -129,7 +133,8 @@ std::vector<T> items_of(const WrittenArray& array) {
   for (bool more = true; more;) {
     bool is_first = true;
     for (std::size_t d = 1; d < at.size(); ++d) is_first = is_first && at[d] < array.chunk[d];
-    const bool is_absent = at[0] / array.chunk[0] == 1 || (at.size() > 1 && is_first);
+    const bool is_absent =
+        at[0] / array.chunk[0] == 1 || (at.size() > 1 && is_first) || out.size() % 5 == 0;
     const double wave = 1000 * (1.5 + std::sin(0.37 * static_cast<double>(out.size())));
     const T absent = std::is_floating_point_v<T> ? std::numeric_limits<T>::quiet_NaN() : T{};
     out.push_back(is_absent ? absent : static_cast<T>(wave));
@@ -181,9 +186,9 @@ TEST_P(WrittenStores, AreReadBackByTheReader) {
   const auto arrays = some_arrays(GetParam());
   std::vector<WrittenFile> files;
   for (const WrittenArray& array : arrays) {
-    ASSERT_TRUE(zarr::check_array(array)) << zarr::check_array(array).error().message;
     write_one(path, array, files);
   }
+  ASSERT_TRUE(zarr::check_arrays(arrays)) << zarr::check_arrays(arrays).error().message;
   ASSERT_TRUE(zarr::write_metadata(path, arrays, {}));
   const auto location = locate(path);
   ASSERT_TRUE(location);
@@ -346,6 +351,14 @@ TEST(StoreMetadata, RefusesArraysThatAreNotRead) {
   EXPECT_THAT(array_fault([](WrittenArray& a) { a.compression.level = 0; }), HasSubstr("1 to 9"));
 }
 
+TEST(StoreMetadata, RefusesTwoArraysOfOneName) {
+  const WrittenArray array = array_of("0/a", {4}, {2});
+  EXPECT_TRUE(zarr::check_arrays({array, array_of("1/a", {4}, {2})}));
+  const auto fine = zarr::check_arrays({array, array_of("1/a", {4}, {2}), array});
+  ASSERT_FALSE(fine);
+  EXPECT_EQ(fine.error().message, "two arrays cannot be written as '0/a'");
+}
+
 std::vector<float> constant(float value) { return std::vector<float>(8, value); }
 
 TEST(ShardWriters, WriteChunksInTheOrderOfTheCalls) {
@@ -382,6 +395,17 @@ TEST(ShardWriters, MakeNoFileOfAbsentChunks) {
   const auto files = writer.close();
   ASSERT_TRUE(files);
   EXPECT_TRUE(files->empty());
+  // Also where chunks reach beyond the array.
+  WrittenArray odd = array_of("a", {5, 3}, {4, 2});
+  const std::vector<float> all(15, masked);
+  const auto floats = zarr::write_array(folder / "s", odd, std::span<const float>(all));
+  ASSERT_TRUE(floats);
+  EXPECT_TRUE(floats->empty());
+  odd.dtype = {'u', 4};
+  const std::vector<std::uint32_t> none(15, 0);
+  const auto counts = zarr::write_array(folder / "s", odd, std::span<const std::uint32_t>(none));
+  ASSERT_TRUE(counts);
+  EXPECT_TRUE(counts->empty());
   EXPECT_FALSE(std::filesystem::exists(folder / "s"));
 }
 

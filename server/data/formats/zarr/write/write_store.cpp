@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -241,6 +242,18 @@ Result<void> check_array(const WrittenArray& array) {
   if (fault.empty()) return {};
   return make_error(ErrorKind::invalid,
                     "the array " + in_quotes(array.path) + " cannot be written: " + fault);
+}
+
+Result<void> check_arrays(const std::vector<WrittenArray>& arrays) {
+  std::set<std::string_view> paths;
+  for (const WrittenArray& array : arrays) {
+    if (auto fine = check_array(array); !fine) return fine;
+    if (!paths.insert(array.path).second) {
+      return make_error(ErrorKind::invalid,
+                        "two arrays cannot be written as " + in_quotes(array.path));
+    }
+  }
+  return {};
 }
 
 Texts metadata_files(const std::vector<WrittenArray>& arrays,

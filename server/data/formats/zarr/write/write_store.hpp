@@ -50,6 +50,8 @@ struct WrittenArray {
 // Errors: invalid, naming the array: a path that a store or its reader does not take, lengths that
 // do not fit together, chunks or shards beyond what the reader accepts, another type.
 Result<void> check_array(const WrittenArray& array);
+// Of each array, and that no two have one path.
+Result<void> check_arrays(const std::vector<WrittenArray>& arrays);
 
 // A group besides those that the paths of arrays imply, or with attributes. Path "": the root.
 struct WrittenGroup {
@@ -60,7 +62,7 @@ struct WrittenGroup {
 // The metadata files of a store: their paths in it and their text, that of the root last. The
 // root's has those of all arrays and groups besides (consolidated metadata), and so has each other
 // group's in version 3, as it can be opened alone. Equal input gives equal bytes. `arrays`: at
-// least one, each fit for check_array().
+// least one, fit for check_arrays().
 std::vector<std::pair<std::string, std::string>> metadata_files(
     const std::vector<WrittenArray>& arrays, const std::vector<WrittenGroup>& groups);
 
