@@ -35,7 +35,7 @@ using zarr::StoreFormat;
 using zarr::WrittenArray;
 using zarr::WrittenFile;
 
-std::uint32_t sum_of(const std::vector<unsigned char>& bytes) {
+std::uint32_t crc_of(const std::vector<unsigned char>& bytes) {
   return zarr::crc32c(bytes.data(), bytes.size());
 }
 
@@ -56,13 +56,13 @@ TEST(Crc32c, GivesTheSumsOfRfc3720) {
   command[31] = 0x18;
   command[32] = 0x28;
   command[40] = 0x02;
-  EXPECT_EQ(sum_of(std::vector<unsigned char>(32, 0)), 0x8a9136aaU);
-  EXPECT_EQ(sum_of(std::vector<unsigned char>(32, 0xff)), 0x62a8ab43U);
-  EXPECT_EQ(sum_of(rising), 0x46dd794eU);
-  EXPECT_EQ(sum_of(falling), 0x113fdb5cU);
-  EXPECT_EQ(sum_of(command), 0xd9963a56U);
-  EXPECT_EQ(sum_of({'1', '2', '3', '4', '5', '6', '7', '8', '9'}), 0xe3069283U);
-  EXPECT_EQ(sum_of({}), 0U);
+  EXPECT_EQ(crc_of(std::vector<unsigned char>(32, 0)), 0x8a9136aaU);
+  EXPECT_EQ(crc_of(std::vector<unsigned char>(32, 0xff)), 0x62a8ab43U);
+  EXPECT_EQ(crc_of(rising), 0x46dd794eU);
+  EXPECT_EQ(crc_of(falling), 0x113fdb5cU);
+  EXPECT_EQ(crc_of(command), 0xd9963a56U);
+  EXPECT_EQ(crc_of({'1', '2', '3', '4', '5', '6', '7', '8', '9'}), 0xe3069283U);
+  EXPECT_EQ(crc_of({}), 0U);
 }
 
 // Of any length, from any place in memory.
@@ -81,9 +81,10 @@ TEST(Crc32c, OfPartsGoesOnFromTheSumBefore) {
   }
 }
 
-using Lengths = std::vector<std::size_t>;
+using ArrayLengths = std::vector<std::size_t>;
 
-WrittenArray array_of(const std::string& path, Lengths shape, Lengths chunk, Lengths shard = {}) {
+WrittenArray array_of(const std::string& path, ArrayLengths shape, ArrayLengths chunk,
+                      ArrayLengths shard = {}) {
   WrittenArray out;
   out.path = path;
   out.shape = std::move(shape);
@@ -129,7 +130,7 @@ std::vector<WrittenArray> some_arrays(StoreFormat format) {
 template <class T>
 std::vector<T> items_of(const WrittenArray& array) {
   std::vector<T> out;
-  Lengths at(array.shape.size());
+  ArrayLengths at(array.shape.size());
   for (bool more = true; more;) {
     bool is_first = true;
     for (std::size_t d = 1; d < at.size(); ++d) is_first = is_first && at[d] < array.chunk[d];
@@ -169,7 +170,8 @@ template <class T>
 void expect_items(const zarr::Store& store, int variable, const WrittenArray& array) {
   const std::vector<T> expected = items_of<T>(array);
   std::vector<double> found(expected.size());
-  const auto done = store.read(variable, Lengths(array.shape.size(), 0), array.shape, found.data());
+  const auto done =
+      store.read(variable, ArrayLengths(array.shape.size(), 0), array.shape, found.data());
   ASSERT_TRUE(done) << done.error().message;
   for (std::size_t n = 0; n < found.size(); ++n) {
     const auto wanted = static_cast<double>(expected[n]);
@@ -359,7 +361,7 @@ TEST(StoreMetadata, RefusesTwoArraysOfOneName) {
   EXPECT_EQ(fine.error().message, "two arrays cannot be written as '0/a'");
 }
 
-std::vector<float> constant(float value) { return std::vector<float>(8, value); }
+std::vector<float> alike_items(float value) { return std::vector<float>(8, value); }
 
 TEST(ShardWriters, WriteChunksInTheOrderOfTheCalls) {
   const Folder folder;
@@ -367,9 +369,9 @@ TEST(ShardWriters, WriteChunksInTheOrderOfTheCalls) {
   array.compression.kind = Compression::Kind::none;
   const float masked = std::numeric_limits<float>::quiet_NaN();
   ShardWriter writer(folder / "s", array, {0});
-  ASSERT_TRUE(writer.add(3, std::span<const float>(constant(3))));
-  ASSERT_TRUE(writer.add(1, std::span<const float>(constant(masked))));
-  ASSERT_TRUE(writer.add(0, std::span<const float>(constant(0))));
+  ASSERT_TRUE(writer.add(3, std::span<const float>(alike_items(3))));
+  ASSERT_TRUE(writer.add(1, std::span<const float>(alike_items(masked))));
+  ASSERT_TRUE(writer.add(0, std::span<const float>(alike_items(0))));
   const auto files = writer.close();
   ASSERT_TRUE(files) << files.error().message;
   ASSERT_EQ(files->size(), 1U);
@@ -383,7 +385,7 @@ TEST(ShardWriters, WriteChunksInTheOrderOfTheCalls) {
   constexpr auto absent = zarr::absent_span;
   EXPECT_EQ(index,
             (std::array<std::uint64_t, 8>{chunk, chunk, absent, absent, absent, absent, 0, chunk}));
-  EXPECT_EQ(std::memcmp(bytes.data(), constant(3).data(), 32), 0);
+  EXPECT_EQ(std::memcmp(bytes.data(), alike_items(3).data(), 32), 0);
 }
 
 TEST(ShardWriters, MakeNoFileOfAbsentChunks) {
@@ -391,7 +393,7 @@ TEST(ShardWriters, MakeNoFileOfAbsentChunks) {
   const WrittenArray array = array_of("a", {32}, {8}, {32});
   ShardWriter writer(folder / "s", array, {0});
   const float masked = std::numeric_limits<float>::quiet_NaN();
-  ASSERT_TRUE(writer.add(2, std::span<const float>(constant(masked))));
+  ASSERT_TRUE(writer.add(2, std::span<const float>(alike_items(masked))));
   const auto files = writer.close();
   ASSERT_TRUE(files);
   EXPECT_TRUE(files->empty());
@@ -416,7 +418,7 @@ TEST(ShardWriters, GiveEqualBytesEachTime) {
   std::vector<std::string> found;
   for (int n = 0; n < 2; ++n) {
     ShardWriter writer(folder / "s", array, {0});
-    ASSERT_TRUE(writer.add(2, std::span<const float>(constant(5))));
+    ASSERT_TRUE(writer.add(2, std::span<const float>(alike_items(5))));
     ASSERT_TRUE(writer.close());
     found.push_back(bytes_of(folder / "s/a/c/0"));
     write_bytes(folder / "s/a/c/0", std::string(100'000, 'x'));
@@ -430,9 +432,9 @@ TEST(ShardWriters, RemoveFilesThatWereNotClosed) {
   const WrittenArray array = array_of("a", {32}, {8}, {32});
   {
     ShardWriter writer(folder / "s", array, {0});
-    ASSERT_TRUE(writer.add(2, std::span<const float>(constant(5))));
+    ASSERT_TRUE(writer.add(2, std::span<const float>(alike_items(5))));
     ShardWriter moved(std::move(writer));
-    ASSERT_TRUE(moved.add(3, std::span<const float>(constant(6))));
+    ASSERT_TRUE(moved.add(3, std::span<const float>(alike_items(6))));
     EXPECT_TRUE(std::filesystem::exists(path));
   }
   EXPECT_FALSE(std::filesystem::exists(path));

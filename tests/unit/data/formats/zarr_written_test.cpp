@@ -225,6 +225,13 @@ TEST(WrittenAttributes, OfMeansNameTheirMethod) {
                           Pair("windsplat_vector", "wind 2")));
 }
 
+TEST(WrittenAttributes, OfPositionsAreThoseOfCf) {
+  EXPECT_THAT(cf::longitude_attributes(),
+              ElementsAre(Pair("standard_name", "longitude"), Pair("units", "degrees_east")));
+  EXPECT_THAT(cf::latitude_attributes(),
+              ElementsAre(Pair("standard_name", "latitude"), Pair("units", "degrees_north")));
+}
+
 TEST(WrittenAttributes, OfASeaFloorAreOfItsDepth) {
   Ground floor;
   floor.kind = GroundKind::sea_floor;
