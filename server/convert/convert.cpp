@@ -1,0 +1,152 @@
+#include "server/convert/convert.hpp"
+
+#include <fcntl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+#include <utility>
+
+#include "server/base/disk_error.hpp"
+#include "server/base/whole_file.hpp"
+#include "server/convert/checksums.hpp"
+#include "server/convert/finish.hpp"
+#include "server/convert/journal.hpp"
+#include "server/convert/memory.hpp"
+#include "server/convert/plan.hpp"
+#include "server/convert/unit.hpp"
+#include "server/convert/workers.hpp"
+
+namespace windsplat::convert {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Error failed(const char* what, const fs::path& path, int fault) {
+  return disk_error(fault, std::string(what) + ' ' + in_quotes(path.native()));
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code fault;
+  return fs::symlink_status(path, fault).type() != fs::file_type::not_found;
+}
+
+bool is_zarr(const fs::path& path) {
+  return is_there(path / "zarr.json") || is_there(path / ".zgroup");
+}
+
+// Where the store is written, until it is complete.
+fs::path part_of_store(const fs::path& output) {
+  fs::path plain = output.lexically_normal();
+  if (!plain.has_filename()) plain = plain.parent_path();
+  return plain.native() + ".part";
+}
+
+Result<void> check_output(const fs::path& output, bool force) {
+  if (!is_there(output)) return {};
+  if (!force) {
+    return make_error(ErrorKind::conflict,
+                      in_quotes(output.native()) + " exists; --force replaces it");
+  }
+  if (is_zarr(output)) return {};
+  return make_error(ErrorKind::conflict, in_quotes(output.native()) +
+                                             " exists and is not a Zarr store: it is not replaced");
+}
+
+// Begins or continues the folder of an unfinished store.
+Result<void> prepare(const fs::path& part, bool restart) {
+  std::error_code fault;
+  const bool begun = is_there(journal_path(part));
+  if (is_there(part) && !begun && !(restart && is_zarr(part)) && !fs::is_empty(part, fault)) {
+    return make_error(ErrorKind::conflict,
+                      in_quotes(part.native()) +
+                          " exists and was not left by an unfinished conversion: remove it");
+  }
+  if (restart) fs::remove_all(part, fault);
+  if (!fault) fs::create_directories(part / ".coarse", fault);
+  if (fault) return failed("cannot make", part, fault.value());
+  return {};
+}
+
+// Gives the store its name; the old one is removed.
+Result<void> put_in_place(const fs::path& part, const fs::path& output) {
+  const int folder = ::open(part.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = folder >= 0 && ::syncfs(folder) == 0;
+  const int fault = errno;
+  if (folder >= 0) ::close(folder);
+  if (!synced) return failed("cannot sync", part, fault);
+  const bool replaces = is_there(output);
+  const unsigned how = replaces ? RENAME_EXCHANGE : RENAME_NOREPLACE;
+  if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, output.c_str(), how) != 0) {
+    return failed("cannot rename the store to", output, errno);
+  }
+  std::error_code ignored;
+  if (replaces) fs::remove_all(part, ignored);
+  fs::remove_all(output / ".coarse", ignored);
+  fs::remove(journal_path(output), ignored);
+  const fs::path parent = output.has_parent_path() ? output.parent_path() : fs::path(".");
+  return sync_folder(parent);
+}
+
+std::string times_text(double times) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f", times);
+  return text;
+}
+
+}  // namespace
+
+Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Coarsening>& chain,
+                       const Options& options, const Open& open, const fs::path& output,
+                       const CancelToken& cancel, const ShowDone& progress) {
+  constexpr double decoded_often = 4;
+  auto plan = make_plan(info, chain, options);
+  if (!plan) return plan.error();
+  const auto shares = share_memory(info, *plan, options);
+  if (!shares) return shares.error();
+  if (auto free = check_output(output, options.force); !free) return free.error();
+  const fs::path part = part_of_store(output);
+  if (auto done = prepare(part, options.restart); !done) return done.error();
+  auto journal = Journal::open(part, *plan);
+  if (!journal) return journal.error();
+
+  const auto known = (*journal)->done();
+  Task task;
+  task.take = [&](std::size_t unit, UnitFiles files) {
+    return (*journal)->add(unit, std::move(files));
+  };
+  for (std::size_t unit = 0; unit < plan->units.size(); ++unit) {
+    if (!known.contains(unit)) task.units.push_back(unit);
+  }
+  Report report;
+  report.workers = shares->workers;
+  report.units_done = task.units.size();
+  report.units_kept = known.size();
+  report.notes = plan->notes;
+  if (shares->decoded >= decoded_often) {
+    report.notes.push_back("the chunks of " + in_quotes(shares->decoded_field) + " are decoded " +
+                           times_text(shares->decoded) +
+                           " times, as they are larger than what the memory limit lets be read "
+                           "at once");
+  }
+  const auto read_bytes = make_units(info, *plan, *shares, open, part, task, cancel, progress);
+  if (!read_bytes) {
+    Error error = read_bytes.error();
+    error.message += "; what is done is kept in " + in_quotes(part.native()) +
+                     ", and the same command continues it";
+    return error;
+  }
+  report.read_bytes = *read_bytes;
+  const auto bytes = finish(info, *plan, part, (*journal)->done(), cancel);
+  if (!bytes) return bytes.error();
+  report.written_bytes = *bytes;
+  fs::path target = part;
+  target.replace_extension();  // without ".part"
+  if (auto done = put_in_place(part, target); !done) return done.error();
+  return report;
+}
+
+}  // namespace windsplat::convert
