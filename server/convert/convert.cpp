@@ -1,7 +1,7 @@
 #include "server/convert/convert.hpp"
 
 #include <fcntl.h>
-#include <sys/syscall.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -65,10 +65,32 @@ Result<void> prepare(const fs::path& part, bool restart) {
                       in_quotes(part.native()) +
                           " exists and was not left by an unfinished conversion: remove it");
   }
+  if (restart && begun) {
+    if (auto free = Journal::check_free(part); !free) return free;
+  }
   if (restart) fs::remove_all(part, fault);
-  if (!fault) fs::create_directories(part / ".coarse", fault);
+  if (!fault) fs::create_directories(part, fault);
   if (fault) return failed("cannot make", part, fault.value());
   return {};
+}
+
+// What only an unfinished store needs; the journal last.
+void clean(const fs::path& store) {
+  std::error_code ignored;
+  fs::remove_all(store / ".coarse", ignored);
+  fs::remove(journal_path(store), ignored);
+}
+
+// Exchanges the names of two folders, or gives one the name of the other, which is not there.
+int rename_to(const fs::path& part, const fs::path& output, bool exchanges) {
+  const unsigned how = exchanges ? RENAME_EXCHANGE : RENAME_NOREPLACE;
+  if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, output.c_str(), how) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+  // The file system has neither.
+  const fs::path old = part.native() + ".old";
+  if (exchanges && ::rename(output.c_str(), old.c_str()) != 0) return errno;
+  if (::rename(part.c_str(), output.c_str()) != 0) return errno;
+  return exchanges && ::rename(old.c_str(), part.c_str()) != 0 ? errno : 0;
 }
 
 // Gives the store its name; the old one is removed.
@@ -79,14 +101,12 @@ Result<void> put_in_place(const fs::path& part, const fs::path& output) {
   if (folder >= 0) ::close(folder);
   if (!synced) return failed("cannot sync", part, fault);
   const bool replaces = is_there(output);
-  const unsigned how = replaces ? RENAME_EXCHANGE : RENAME_NOREPLACE;
-  if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, output.c_str(), how) != 0) {
-    return failed("cannot rename the store to", output, errno);
+  if (const int failure = rename_to(part, output, replaces); failure != 0) {
+    return failed("cannot rename the store to", output, failure);
   }
+  clean(output);
   std::error_code ignored;
   if (replaces) fs::remove_all(part, ignored);
-  fs::remove_all(output / ".coarse", ignored);
-  fs::remove(journal_path(output), ignored);
   const fs::path parent = output.has_parent_path() ? output.parent_path() : fs::path(".");
   return sync_folder(parent);
 }
@@ -107,11 +127,22 @@ Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Co
   if (!plan) return plan.error();
   const auto shares = share_memory(info, *plan, options);
   if (!shares) return shares.error();
+  Report report;
+  if (!options.force && is_there(journal_path(output))) {
+    // A run was ended after it had renamed the store.
+    if (auto same = Journal::open(output, *plan); !same) return same.error();
+    clean(output);
+    report.units_kept = plan->units.size();
+    return report;
+  }
   if (auto free = check_output(output, options.force); !free) return free.error();
   const fs::path part = part_of_store(output);
   if (auto done = prepare(part, options.restart); !done) return done.error();
   auto journal = Journal::open(part, *plan);
   if (!journal) return journal.error();
+  if (::mkdir((part / ".coarse").c_str(), 0777) != 0 && errno != EEXIST) {
+    return failed("cannot make a folder in", part, errno);
+  }
 
   const auto known = (*journal)->done();
   Task task;
@@ -121,7 +152,6 @@ Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Co
   for (std::size_t unit = 0; unit < plan->units.size(); ++unit) {
     if (!known.contains(unit)) task.units.push_back(unit);
   }
-  Report report;
   report.workers = shares->workers;
   report.units_done = task.units.size();
   report.units_kept = known.size();

@@ -106,7 +106,9 @@ Journal::~Journal() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-Result<void> Journal::load(const fs::path& store, const Plan& plan) {
+Result<void> Journal::check_free(const fs::path& store) { return Journal().hold(store); }
+
+Result<void> Journal::hold(const fs::path& store) {
   path_ = journal_path(store);
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor_ < 0) return disk_error(errno, "cannot open " + in_quotes(path_.native()));
@@ -114,6 +116,11 @@ Result<void> Journal::load(const fs::path& store, const Plan& plan) {
     return make_error(ErrorKind::conflict,
                       in_quotes(store.native()) + " is being written by another run");
   }
+  return {};
+}
+
+Result<void> Journal::load(const fs::path& store, const Plan& plan) {
+  if (auto held = hold(store); !held) return held;
   std::ifstream file(path_, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(file)), {});
   std::size_t whole = 0;  // bytes of whole lines

@@ -24,6 +24,8 @@ class Journal {
   // the difference), internal, out_of_memory.
   static Result<std::unique_ptr<Journal>> open(const std::filesystem::path& store,
                                                const Plan& plan);
+  // Errors: conflict, while another run holds that of a store.
+  static Result<void> check_free(const std::filesystem::path& store);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
@@ -35,6 +37,7 @@ class Journal {
 
  private:
   Journal() = default;
+  Result<void> hold(const std::filesystem::path& store);
   Result<void> load(const std::filesystem::path& store, const Plan& plan);
   Result<void> append(const data::zarr::OrderedJson& line);
 

@@ -55,7 +55,7 @@ bool are_even(const std::vector<double>& widths, std::size_t axis, int halvings)
 Result<data::zarr::Compression> parse_compression(const std::string& text) {
   using data::zarr::Compression;
   if (text == "lz4") return Compression{Compression::Kind::lz4, 5};
-  if (text == "none") return Compression{Compression::Kind::none, 0};
+  if (text == "none") return Compression{Compression::Kind::none, 1};
   if (text == "zstd") return Compression{Compression::Kind::zstd, 1};
   if (text.size() == 6 && text.starts_with("zstd:") && text[5] >= '1' && text[5] <= '9') {
     return Compression{Compression::Kind::zstd, text[5] - '0'};
