@@ -71,6 +71,10 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(boxes ${SYSTEM_PYTHON} tests/integration/boxes.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(convert ${SYSTEM_PYTHON} tests/integration/convert/convert.py
+    --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(interrupted ${SYSTEM_PYTHON} tests/integration/convert/interrupted.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi/openapi_requests.py
     --program=$<TARGET_FILE:windsplat> --count=600)
   windsplat_program_test(uploads ${SYSTEM_PYTHON} tests/integration/uploads.py

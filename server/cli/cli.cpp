@@ -24,7 +24,8 @@ namespace {
 
 constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
-    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study, synth).\n"
+    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, convert, study,\n"
+    "synth).\n"
     "Where an option names an environment variable, that may set it; the option has precedence.";
 
 // The first option or argument with an empty value, as "--size"; empty if there is none. An empty
@@ -137,6 +138,7 @@ int run(int argc, const char* const* argv) {
     add_animate(app, chosen);
     add_inspect(app, chosen);
     add_synth(app, chosen);
+    add_convert(app, chosen);
     add_healthcheck(app, chosen);
     add_study(app, chosen);
     add_help(app, chosen);

@@ -30,6 +30,7 @@ void add_render(CLI::App& app, Action& chosen);
 void add_animate(CLI::App& app, Action& chosen);
 void add_inspect(CLI::App& app, Action& chosen);
 void add_synth(CLI::App& app, Action& chosen);
+void add_convert(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);
 void add_study(CLI::App& app, Action& chosen);
 void add_help(CLI::App& app, Action& chosen);  // help, man and completions

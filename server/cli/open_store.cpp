@@ -9,9 +9,11 @@
 
 #include "server/base/check.hpp"
 #include "server/data/cf/grid/crs_wkt.hpp"
+#include "server/data/derived/source.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/formats/grib/open.hpp"
 #include "server/data/loader/loader.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::cli {
 
@@ -80,6 +82,27 @@ Result<void> check_host(const data::fetch::Fetcher* fetcher, const data::Locatio
           "given");
 }
 
+// Tables of the libraries, and how files are fetched.
+void add_surroundings(data::loader::Limits& limits, const FetcherPtr& fetcher) {
+  limits.library_folders = folders_of(data::grib::definitions_folder());
+  if (std::string folder = data::cf::projection_database_folder(); !folder.empty()) {
+    limits.library_folders.push_back(std::move(folder));
+  }
+  if (fetcher) let_fetch(limits, fetcher);
+}
+
+Result<std::unique_ptr<data::Source>> open_location(const data::Location& location,
+                                                    const data::loader::Limits& limits,
+                                                    const data::fetch::Fetcher* fetcher,
+                                                    const CancelToken& cancel) {
+  if (location.fetched) {
+    if (auto permitted = check_host(fetcher, location); !permitted) return permitted.error();
+  }
+  auto source = data::loader::open(location, limits, cancel);
+  if (!source) return source.error();
+  return std::unique_ptr<data::Source>(std::move(*source));
+}
+
 data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
                               data::loader::Limits limits, FetcherPtr fetcher) {
   data::StoreOptions options;
@@ -88,28 +111,34 @@ data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
   options.budget = std::make_shared<data::Budget>(options.bytes_max, limit_name(memory_bytes));
   limits.memory_bytes =
       std::clamp(memory_bytes / 4, std::min(loader_bytes_min, memory_bytes / 2), loader_bytes_max);
-  limits.library_folders = folders_of(data::grib::definitions_folder());
-  if (std::string folder = data::cf::projection_database_folder(); !folder.empty()) {
-    limits.library_folders.push_back(std::move(folder));
-  }
   limits.budget = options.budget;
   options.storage = storage;
-  if (fetcher) let_fetch(limits, fetcher);
-  options.open = [limits, fetcher = std::move(fetcher)](
-                     const data::Location& location,
-                     const CancelToken& cancel) -> Result<std::unique_ptr<data::Source>> {
-    if (location.fetched) {
-      if (auto permitted = check_host(fetcher.get(), location); !permitted)
-        return permitted.error();
-    }
-    auto source = data::loader::open(location, limits, cancel);
-    if (!source) return source.error();
-    return std::unique_ptr<data::Source>(std::move(*source));
+  add_surroundings(limits, fetcher);
+  options.open = [limits, fetcher = std::move(fetcher)](const data::Location& location,
+                                                        const CancelToken& cancel) {
+    return open_location(location, limits, fetcher.get(), cancel);
   };
   return options;
 }
 
 }  // namespace
+
+Result<std::unique_ptr<data::Source>> open_source(const std::string& name,
+                                                  std::uint64_t loader_bytes,
+                                                  const FetcherPtr& fetcher,
+                                                  const CancelToken& cancel) {
+  if (const auto sample = data::sized_sample(name)) {
+    auto source = data::open_sample(sample->name, sample->dims);
+    if (!source) return source.error();
+    return std::unique_ptr<data::Source>(data::derived::with_derived_fields(std::move(*source)));
+  }
+  const auto location = data::locate(name);
+  if (!location) return location.error();
+  data::loader::Limits limits;
+  limits.memory_bytes = loader_bytes;
+  add_surroundings(limits, fetcher);
+  return open_location(*location, limits, fetcher.get(), cancel);
+}
 
 std::string bytes_text(std::uint64_t bytes) {
   constexpr std::string_view units = "TGM";

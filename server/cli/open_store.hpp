@@ -39,4 +39,11 @@ data::StoreOptions store_options(std::uint64_t memory_bytes, FetcherPtr fetcher 
 // reading than for opening.
 data::StoreOptions frugal_store_options(std::uint64_t memory_bytes, FetcherPtr fetcher = nullptr);
 
+// A sample or files by name, without a store and its limit; `loader_bytes`: of the private memory
+// of the loader. Errors: those of Store::add().
+Result<std::unique_ptr<data::Source>> open_source(const std::string& name,
+                                                  std::uint64_t loader_bytes,
+                                                  const FetcherPtr& fetcher,
+                                                  const CancelToken& cancel);
+
 }  // namespace windsplat::cli
