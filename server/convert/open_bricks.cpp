@@ -29,6 +29,16 @@ Result<void> OpenBricks::put(std::size_t array, const data::Box& box, const floa
   return {};
 }
 
+std::vector<float> OpenBricks::room_for(const Three& there) {
+  constexpr float absent = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t count = product(level_.brick) * writers_.size();
+  if (spare_.empty()) return std::vector<float>(count, absent);
+  std::vector<float> out = std::move(spare_.back());
+  spare_.pop_back();
+  if (there != level_.brick) std::fill(out.begin(), out.end(), absent);
+  return out;
+}
+
 Result<void> OpenBricks::put_into(const Three& at, std::size_t array, const data::Box& box,
                                   const float* values) {
   data::Box room;  // beyond the data too
@@ -45,9 +55,7 @@ Result<void> OpenBricks::put_into(const Three& at, std::size_t array, const data
   const std::size_t number = number_in_region(level_, at);
   auto found = open_.find(number);
   if (found == open_.end()) {
-    Brick made{
-        std::vector<float>(samples * writers_.size(), std::numeric_limits<float>::quiet_NaN()),
-        product(there) * writers_.size()};
+    Brick made{room_for(there), product(there) * writers_.size()};
     found = open_.emplace(number, std::move(made)).first;
   }
   Brick& brick = found->second;
@@ -58,6 +66,7 @@ Result<void> OpenBricks::put_into(const Three& at, std::size_t array, const data
     const std::span<const float> items(brick.values.data() + n * samples, samples);
     if (auto done = writers_[n]->add(number, items); !done) return done;
   }
+  spare_.push_back(std::move(brick.values));
   open_.erase(found);
   return {};
 }

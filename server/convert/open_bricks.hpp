@@ -27,13 +27,16 @@ class OpenBricks {
     std::vector<float> values;  // of all arrays
     std::size_t missing = 0;
   };
+  // Memory for all arrays of a brick, of which so many samples are in the data.
+  std::vector<float> room_for(const Three& there);
   Result<void> put_into(const Three& brick, std::size_t array, const data::Box& box,
                         const float* values);
 
   const Level& level_;
   data::Box box_;
   std::vector<data::zarr::ShardWriter*> writers_;
-  std::map<std::size_t, Brick> open_;  // by number in the region
+  std::map<std::size_t, Brick> open_;      // by number in the region
+  std::vector<std::vector<float>> spare_;  // of bricks that were complete
 };
 
 // The number of a brick in its region of a shard, and the region's place along t, z, y, x.

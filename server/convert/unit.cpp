@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "server/base/check.hpp"
 #include "server/base/whole_file.hpp"
 #include "server/convert/open_bricks.hpp"
 
@@ -165,7 +166,7 @@ class UnitMaker {
       brick[a] = (box.first[a] + in_pencil.first[a]) / level.brick[a];
       in_unit[a] = (box.first[a] + in_pencil.first[a] - box_.first[a]) / level.brick[a];
     }
-    const data::Volume values = cut(pencil, in_pencil);
+    const data::Volume& values = brick_of(pencil, in_pencil);
     statistics_.set(flat(in_unit, kept_.bricks()), statistics_of(values));
     const std::size_t number = number_in_region(level, brick);
     const Product& samples = field_.products.front();
@@ -180,6 +181,21 @@ class UnitMaker {
       if (!done) return done;
     }
     return {};
+  }
+
+  // The samples of a box of a pencil, in memory that is used again.
+  const data::Volume& brick_of(const data::Volume& pencil, const data::Box& box) {
+    const std::size_t samples = box.samples();
+    const std::size_t count = samples * static_cast<std::size_t>(pencil.components);
+    if (brick_.values.size() != count) brick_.values = data::Samples(count);
+    brick_.dims = box.count;
+    brick_.components = pencil.components;
+    for (int c = 0; c < pencil.components; ++c) {
+      copy_common(pencil.component(c), {{0, 0, 0}, pencil.dims}, box,
+                  brick_.values.data() + static_cast<std::size_t>(c) * samples);
+    }
+    WINDSPLAT_CHECK(measure_volume(brick_));  // as the pencil is masked
+    return brick_;
   }
 
   void keep(std::size_t array, const data::Box& box, const float* values) {
@@ -201,6 +217,7 @@ class UnitMaker {
   std::map<std::size_t, ShardWriter> writers_;   // by array
   std::vector<std::optional<OpenBricks>> open_;  // by level
   std::vector<float> padded_;
+  data::Volume brick_;
 };
 
 }  // namespace
