@@ -164,9 +164,11 @@ class ArraySource final : public FileSource {
     return true;
   }
 
-  Result<bool> fill_part(std::size_t field, std::size_t step, const Box& box, float* out) override {
-    WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size());
+  Result<bool> fill_part(std::size_t field, std::size_t step, const StoredPart& part,
+                         float* out) override {
+    WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size() && part.level == 0);
     if (!info_.fields[field].is_read_by_boxes()) return false;
+    const Box& box = part.box;
     const Plan& plan = plans_[field];
     for (std::size_t c = 0; c < plan.variables.size(); ++c) {
       const int v = plan.variables[c];

@@ -53,10 +53,10 @@ class DerivedSource final : public FileSource {
     return field < own_ ? source_->read(field, step) : FileSource::read(field, step);
   }
 
-  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override {
+  Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override {
     begin();
-    return field < own_ ? source_->read_part(field, step, box)
-                        : FileSource::read_part(field, step, box);
+    return field < own_ ? source_->read_part(field, step, part)
+                        : FileSource::read_part(field, step, part);
   }
 
   Result<void> fill(std::size_t field, std::size_t step, float* out) override {
@@ -79,11 +79,12 @@ class DerivedSource final : public FileSource {
     return file_->fill_in_parts(field, step, taker);
   }
 
-  Result<bool> fill_part(std::size_t field, std::size_t step, const Box& box, float* out) override {
+  Result<bool> fill_part(std::size_t field, std::size_t step, const StoredPart& part,
+                         float* out) override {
     WINDSPLAT_CHECK(field < info_.fields.size() && step < info_.steps.size());
     begin();
     if (field >= own_ || file_ == nullptr) return false;
-    return file_->fill_part(field, step, box, out);
+    return file_->fill_part(field, step, part, out);
   }
 
  private:

@@ -122,8 +122,9 @@ auto guarded(const Work& work) -> decltype(work()) {
 Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memory, bool is_fresh) {
   const DatasetInfo& info = source.info();
   const std::array<int, 3> dims = info.grid.dims();
-  const std::size_t components = info.fields[wanted.field].components.size();
-  const std::size_t samples = wanted.box.samples();
+  const auto components =
+      static_cast<std::size_t>(components_of(info.fields[wanted.field], wanted.part.as));
+  const std::size_t samples = wanted.part.box.samples();
   const std::size_t layer = info.grid.samples() / info.grid.axes[2].coordinates.size();
   const std::size_t floats =
       wanted.window_layers > 0 ? 2 * layer * wanted.window_layers : samples * components;
@@ -138,11 +139,11 @@ Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memor
   }
   // Overwrites numbers of the previous volume.
   if (!is_fresh) std::fill_n(memory.data(), floats, 0.0F);
-  if (wanted.box == whole_box(dims)) {
+  if (wanted.part == StoredPart{whole_box(dims)}) {
     auto done = source.fill(wanted.field, wanted.step, memory.data());
     if (!done) return done.error();
   } else {
-    auto done = source.fill_part(wanted.field, wanted.step, wanted.box, memory.data());
+    auto done = source.fill_part(wanted.field, wanted.step, wanted.part, memory.data());
     if (!done || !*done) return done;
   }
   mask_volume(memory.data(), samples, static_cast<int>(components));

@@ -69,7 +69,7 @@ class RemoteSource : public Source {
   // an invalid message, or if the files changed since opening; out_of_memory if the limit leaves
   // too little for the loader; cancelled.
   Result<Volume> read(std::size_t field, std::size_t step) override;
-  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override;
 
   // Called during reads, on the reading thread, about every 50 ms.
   void on_progress(Progress progress) override;

@@ -180,6 +180,53 @@ void put_field(Writer& out, const FieldInfo& field) {
   }
 }
 
+std::shared_ptr<const StoredLevels> stored_of(Reader& in, const DatasetInfo& info) {
+  StoredLevels stored;
+  stored.levels.resize(in.count(stored_levels_max, 3 * sizeof(std::int32_t)));
+  for (auto& level : stored.levels) {
+    for (int& h : level) h = in.number<std::int32_t>();
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    stored.widths.at(a) = in.doubles(info.grid.axes.at(a).coordinates.size());
+  }
+  stored.fields.resize(in.count(info.fields.size(), text_bytes_min));
+  for (StoredField& field : stored.fields) {
+    const auto has_levels = in.number<std::uint8_t>();
+    if (has_levels > 1) in.fail();
+    field.has_levels = has_levels == 1;
+    field.strided = in.number<std::int32_t>();
+    constexpr std::size_t each = 2 * sizeof(float) + sizeof(std::int64_t);
+    field.ranges.resize(in.count(info.steps.size(), each));
+    for (StoredRange& range : field.ranges) {
+      for (float& end : range.range) end = in.number<float>();
+      range.masked = in.number<std::int64_t>();
+    }
+  }
+  if (!in.sound() || !fault_of(stored, info).empty()) {
+    in.fail();
+    return nullptr;
+  }
+  return std::make_shared<const StoredLevels>(std::move(stored));
+}
+
+void put_stored(Writer& out, const StoredLevels& stored) {
+  out.count(stored.levels.size());
+  for (const auto& level : stored.levels) {
+    for (const int h : level) out.number(static_cast<std::int32_t>(h));
+  }
+  for (const auto& widths : stored.widths) out.doubles(widths);
+  out.count(stored.fields.size());
+  for (const StoredField& field : stored.fields) {
+    out.number(static_cast<std::uint8_t>(field.has_levels ? 1 : 0));
+    out.number(static_cast<std::int32_t>(field.strided));
+    out.count(field.ranges.size());
+    for (const StoredRange& range : field.ranges) {
+      for (const float end : range.range) out.number(end);
+      out.number(range.masked);
+    }
+  }
+}
+
 Error malformed(const char* what) {
   return make_error(ErrorKind::bad_data, std::string("the loader sent ") + what);
 }
@@ -239,7 +286,9 @@ std::string encode_wanted(const Wanted& wanted) {
   Writer out;
   out.number(wanted.field);
   out.number(wanted.step);
-  for (const auto& three : {wanted.box.first, wanted.box.count}) {
+  out.number(static_cast<std::uint64_t>(wanted.part.level));
+  out.number(static_cast<std::uint8_t>(wanted.part.as));
+  for (const auto& three : {wanted.part.box.first, wanted.part.box.count}) {
     for (const int n : three) out.number(static_cast<std::int32_t>(n));
   }
   out.number(wanted.window_layers);
@@ -252,15 +301,18 @@ Result<Wanted> decode_wanted(std::string_view bytes, const DatasetInfo& info) {
   Wanted out;
   out.field = in.number<std::uint64_t>();
   out.step = in.number<std::uint64_t>();
-  for (auto* three : {&out.box.first, &out.box.count}) {
+  out.part.level = in.number<std::uint64_t>();
+  const auto as = in.number<std::uint8_t>();
+  if (as > static_cast<std::uint8_t>(StoredAs::strided)) in.fail();
+  out.part.as = static_cast<StoredAs>(in.sound() ? as : 0);
+  for (auto* three : {&out.part.box.first, &out.part.box.count}) {
     for (int& n : *three) n = in.number<std::int32_t>();
   }
   out.window_layers = in.number<std::uint64_t>();
   out.keeps_memory = in.number<std::uint8_t>() != 0;
-  const bool is_whole = out.box == whole_box(info.grid.dims());
+  const bool is_whole = out.part == StoredPart{whole_box(info.grid.dims())};
   if (in.complete() && out.field < info.fields.size() && out.step < info.steps.size() &&
-      is_within(out.box, info.grid.dims()) && (is_whole || out.window_layers == 0) &&
-      (is_whole || info.fields[out.field].is_read_by_boxes())) {
+      (is_whole || (out.window_layers == 0 && is_stored(info, out.field, out.part)))) {
     return out;
   }
   return make_error(ErrorKind::internal, "no such field, step or box");
@@ -308,6 +360,8 @@ std::string encode_info(const DatasetInfo& info) {
     out.number(step.value);
     out.text(step.text);
   }
+  out.number(static_cast<std::uint8_t>(info.stored ? 1 : 0));
+  if (info.stored) put_stored(out, *info.stored);
   // The largest parts by far come last, so that the message is reallocated only once.
   const Columns none;
   const Columns& columns = info.grid.columns ? *info.grid.columns : none;
@@ -362,6 +416,7 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     if (flag > 1) in.fail();
     return in.sound() && flag == 1;
   };
+  if (follows()) info.stored = stored_of(in, info);
   const std::size_t layer =
       info.grid.axes[0].coordinates.size() * info.grid.axes[1].coordinates.size();
   if (follows()) info.grid.columns = columns_of(in, layer);

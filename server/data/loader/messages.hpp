@@ -9,8 +9,8 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
-#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
+#include "server/data/model/stored.hpp"
 
 namespace windsplat::data::loader {
 
@@ -31,13 +31,13 @@ Result<Task> decode_task(std::string_view bytes);
 struct Wanted {
   std::uint64_t field = 0;
   std::uint64_t step = 0;
-  Box box;
+  StoredPart part;
   // In parts through a window with halves of so many layers, of the whole only; 0: at once.
   std::uint64_t window_layers = 0;
   bool keeps_memory = false;  // for the next volume
 };
 std::string encode_wanted(const Wanted& wanted);
-// Errors: internal if it is malformed, or not of the dataset: field, step, box.
+// Errors: internal if it is malformed, or not of the dataset: field, step, part.
 Result<Wanted> decode_wanted(std::string_view bytes, const DatasetInfo& info);
 
 std::string encode_error(const Error& error);
@@ -47,7 +47,8 @@ Error decode_error(std::string_view bytes);
 
 std::string encode_info(const DatasetInfo& info);
 // Errors: bad_data for malformed info, or for info that no reader returns: axes that are not finite
-// and strictly monotonic, fields without components, no steps, or more than the limits of cf.
+// and strictly monotonic, fields without components, no steps, levels that fault_of() refuses, or
+// more than the limits of cf.
 // Strings are made printable.
 Result<DatasetInfo> decode_info(std::string_view bytes);
 

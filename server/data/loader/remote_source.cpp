@@ -127,14 +127,14 @@ struct RemoteSource::State {
     return static_cast<bool>(transfer_memory.resize(bytes, Urgency::prefetch));
   }
 
-  Result<Volume> read(std::size_t field, std::size_t step, const Box& box) {
+  Result<Volume> read(std::size_t field, std::size_t step, const StoredPart& part) {
     if (auto ready = be_ready(); !ready) return ready.error();
     const FieldInfo& about = info.fields[field];
     Volume volume;
-    volume.dims = box.count;
-    volume.components = static_cast<int>(about.components.size());
+    volume.dims = part.box.count;
+    volume.components = components_of(about, part.as);
     const WindowSize window = window_size(volume);
-    const bool is_whole = box == whole_box(info.grid.dims());
+    const bool is_whole = part == StoredPart{whole_box(info.grid.dims())};
     if (is_whole && window.layers > 0 && wholes.count(field) == 0 && is_there(window)) {
       auto done = read_in_parts(field, step, window, volume);
       if (!done) return done.error();
@@ -143,7 +143,7 @@ struct RemoteSource::State {
       // The loader's memory may have exceeded the limit meanwhile.
       if (auto ready = be_ready(); !ready) return ready.error();
     }
-    if (auto done = read_at_once(field, step, box, volume); !done) return done.error();
+    if (auto done = read_at_once(field, step, part, volume); !done) return done.error();
     return volume;
   }
 
@@ -166,7 +166,7 @@ struct RemoteSource::State {
       transfer = std::move(*made);
     }
     RunningLoader::Call what =
-        call_for(info, {field, step, whole_box(volume.dims), window.layers, true});
+        call_for(info, {field, step, {whole_box(volume.dims)}, window.layers, true});
     what.time = time_to_read(limits, values_of(volume) * sizeof(float));
     if (is_new) what.descriptor = transfer->descriptor();
     ArrivingVolume arriving(volume, window, transfer->values());
@@ -188,8 +188,9 @@ struct RemoteSource::State {
     return wrong(info, is_complete ? invalid_numbers : "sent an incomplete volume", what);
   }
 
-  // The samples of a box, in one piece.
-  Result<void> read_at_once(std::size_t field, std::size_t step, const Box& box, Volume& volume) {
+  // The samples of a part, in one piece.
+  Result<void> read_at_once(std::size_t field, std::size_t step, const StoredPart& part,
+                            Volume& volume) {
     const std::size_t floats = values_of(volume);
     const bool is_new = !transfer || transfer->floats() < floats;
     if (is_new) {
@@ -198,7 +199,7 @@ struct RemoteSource::State {
       if (!made) return made.error();
       transfer = std::move(*made);
     }
-    RunningLoader::Call what = call_for(info, {field, step, box, 0, transfer->is_kept()});
+    RunningLoader::Call what = call_for(info, {field, step, part, 0, transfer->is_kept()});
     // A box may be decoded from chunks of the whole step.
     const std::size_t components = info.fields[field].components.size();
     what.time = time_to_read(limits, info.grid.samples() * components * sizeof(float));
@@ -217,7 +218,7 @@ struct RemoteSource::State {
       if (!is_over) release();
     }
     if (!loader.count_memory()) release();
-    if (measure_volume(volume)) return {};
+    if (measure_part(info, field, step, part.as, volume)) return {};
     release();
     return wrong(info, invalid_numbers, what);
   }
@@ -240,13 +241,15 @@ Result<Volume> RemoteSource::run(std::size_t field, std::size_t step, const Read
 }
 
 Result<Volume> RemoteSource::read(std::size_t field, std::size_t step) {
-  return run(field, step, [&] { return state_->read(field, step, whole_box(info().grid.dims())); });
+  return run(field, step,
+             [&] { return state_->read(field, step, {whole_box(info().grid.dims())}); });
 }
 
-Result<Volume> RemoteSource::read_part(std::size_t field, std::size_t step, const Box& box) {
-  if (auto fine = check_box(box); !fine) return fine.error();
-  if (!info().fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, box);
-  return run(field, step, [&] { return state_->read(field, step, box); });
+Result<Volume> RemoteSource::read_part(std::size_t field, std::size_t step,
+                                       const StoredPart& part) {
+  if (auto fine = check_part(field, part); !fine) return fine.error();
+  if (!info().fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, part);
+  return run(field, step, [&] { return state_->read(field, step, part); });
 }
 
 void RemoteSource::on_progress(Progress progress) {

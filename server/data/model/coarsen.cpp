@@ -286,16 +286,21 @@ std::optional<std::size_t> drawn_sample(const Group& group, int halvings, int st
   return static_cast<std::size_t>(sample);
 }
 
-// Copies drawn samples, group by group. Hashes are of the group's indices in the data alone.
+// Copies drawn samples, group by group. Hashes are of the group's indices in the data alone. `apart`:
+// the distance in the data of the samples that `fine` has: 1, or the stride.
 class Drawer {
  public:
-  Drawer(const Volume& fine, const Coarsening& how)
+  Drawer(const Volume& fine, const Coarsening& how, const std::array<int, 3>& data_dims, int apart)
       : fine_(fine),
         halvings_(how.halvings),
         stride_(how.stride),
+        apart_(apart),
         first_(how.first),
-        data_dims_(data_dims_of(fine, how)) {
-    for (std::size_t a = 0; a < 3; ++a) coarse_.dims[a] = halved(fine.dims[a], halvings_[a]);
+        data_dims_(data_dims) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      WINDSPLAT_CHECK(apart == 1 || fine.dims[a] == (data_dims_[a] + apart - 1) / apart);
+      coarse_.dims[a] = halved(apart == 1 ? fine.dims[a] : data_dims_[a], halvings_[a]);
+    }
     coarse_.components = fine.components;
     coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(fine.components));
   }
@@ -335,7 +340,7 @@ class Drawer {
       const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], data_dims_[a]);
       const auto sample = drawn_sample(along, halvings_[a], stride_, data_dims_[a], hash[a]);
       if (!sample) return std::nullopt;
-      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample -
+      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample / static_cast<unsigned>(apart_) -
            static_cast<std::size_t>(first_[a]);
     }
     return at;
@@ -344,6 +349,7 @@ class Drawer {
   const Volume& fine_;
   std::array<int, 3> halvings_;
   int stride_;
+  int apart_;
   std::array<int, 3> first_, data_dims_;
   Volume coarse_;
 };
@@ -356,8 +362,14 @@ int halved(int samples, int halvings) {
 }
 
 Volume coarsen(const Volume& fine, const Coarsening& how) {
-  if (how.reduction == Reduction::drawn) return Drawer(fine, how).run();
+  if (how.reduction == Reduction::drawn) {
+    return Drawer(fine, how, data_dims_of(fine, how), 1).run();
+  }
   return WeightedReducer(fine, how).run();
+}
+
+Volume draw(const Volume& strided, const Coarsening& how, const std::array<int, 3>& data_dims) {
+  return Drawer(strided, how, data_dims, how.stride).run();
 }
 
 int reduced_components(int components, Reduction reduction) {

@@ -97,6 +97,8 @@ struct TimeStep {
       text;  // ISO 8601 if the calendar is supported ("2001-01-01T03:00:00Z"), otherwise the value
 };
 
+struct StoredLevels;  // model/stored.hpp
+
 // All metadata of a dataset.
 struct DatasetInfo {
   std::string id;
@@ -113,6 +115,7 @@ struct DatasetInfo {
   std::string time_units;
   std::string time_calendar;       // as in CF; empty means standard
   std::uint64_t stored_bytes = 0;  // total size of the files opened by a loader; 0 for samples
+  std::shared_ptr<const StoredLevels> stored;  // null: no coarser levels are stored
 
   [[nodiscard]] const FieldInfo* find(const std::string& name) const;  // null if there is none
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none

@@ -1,20 +1,26 @@
 // Common final steps of all readers of files.
 #include "server/data/model/source.hpp"
 
+#include <string>
+
 #include "server/base/check.hpp"
 
 namespace windsplat::data {
 
-Result<void> Source::check_box(const Box& box) const {
-  if (is_within(box, info().grid.dims())) return {};
-  return make_error(ErrorKind::invalid, "the box " + key_of(box) + " is beyond the grid");
+Result<void> Source::check_part(std::size_t field, const StoredPart& part) const {
+  const auto dims = stored_dims(info(), field, part.level, part.as);
+  if (dims && is_within(part.box, *dims)) return {};
+  const std::string level = part.level > 0 ? " of level " + std::to_string(part.level) : "";
+  return make_error(ErrorKind::invalid, "the box " + key_of(part.box) + level +
+                                            (dims ? " is beyond the grid" : " is not stored"));
 }
 
-Result<Volume> Source::read_part(std::size_t field, std::size_t step, const Box& box) {
-  if (auto fine = check_box(box); !fine) return fine.error();
+Result<Volume> Source::read_part(std::size_t field, std::size_t step, const StoredPart& part) {
+  if (auto fine = check_part(field, part); !fine) return fine.error();
+  WINDSPLAT_CHECK(part.level == 0);
   const auto volume = read(field, step);
   if (!volume) return volume.error();
-  return cut(*volume, box);
+  return cut(*volume, part.box);
 }
 
 Result<Volume> FileSource::read(std::size_t field, std::size_t step) {
@@ -29,20 +35,23 @@ Result<Volume> FileSource::read(std::size_t field, std::size_t step) {
   return volume;
 }
 
-Result<Volume> FileSource::read_part(std::size_t field, std::size_t step, const Box& box) {
-  if (auto fine = check_box(box); !fine) return fine.error();
+Result<Volume> FileSource::read_part(std::size_t field, std::size_t step, const StoredPart& part) {
+  if (auto fine = check_part(field, part); !fine) return fine.error();
   const DatasetInfo& about = info();
   WINDSPLAT_CHECK(field < about.fields.size() && step < about.steps.size());
-  if (!about.fields[field].is_read_by_boxes()) return Source::read_part(field, step, box);
+  if (!about.fields[field].is_read_by_boxes()) return Source::read_part(field, step, part);
   Volume volume;
-  volume.dims = box.count;
-  volume.components = static_cast<int>(about.fields[field].components.size());
-  volume.values = Samples(box.samples() * about.fields[field].components.size());
-  const auto filled = fill_part(field, step, box, volume.values.data());
+  volume.dims = part.box.count;
+  volume.components = components_of(about.fields[field], part.as);
+  volume.values = Samples(volume.samples() * static_cast<std::size_t>(volume.components));
+  const auto filled = fill_part(field, step, part, volume.values.data());
   if (!filled) return filled.error();
   WINDSPLAT_CHECK(*filled);
-  finish_volume(volume);
-  return volume;
+  mask_volume(volume.values.data(), volume.samples(), volume.components);
+  if (measure_part(about, field, step, part.as, volume)) return volume;
+  return make_error(ErrorKind::bad_data, "level " + std::to_string(part.level) + " of " +
+                                             in_quotes(about.fields[field].name) +
+                                             " has shares that are not between 0 and 1");
 }
 
 }  // namespace windsplat::data

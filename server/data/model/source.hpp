@@ -8,8 +8,8 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/stamp.hpp"
-#include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/model/volume.hpp"
 
 namespace windsplat::data {
@@ -25,9 +25,10 @@ class Source {
   [[nodiscard]] virtual const DatasetInfo& info() const = 0;
   // field is an index into info().fields; 0 <= step < info().steps.size().
   virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
-  // A box of them, masked as by read(), with its own range. Reads the whole of fields that are not
-  // read by boxes (FieldInfo::box_chunk). Errors: those of read(); invalid: a box beyond the grid.
-  virtual Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box);
+  // A box of them, masked as by read(), with its own range, or of a stored level. Reads the whole
+  // of fields that are not read by boxes (FieldInfo::box_chunk). Errors: those of read(); invalid:
+  // a box beyond the grid, or a level that is not stored.
+  virtual Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part);
   // May be called from any thread: a running read ends soon with the error cancelled, if the source
   // supports this.
   virtual void cancel() {}
@@ -40,7 +41,7 @@ class Source {
 
  protected:
   // Errors: invalid.
-  [[nodiscard]] Result<void> check_box(const Box& box) const;
+  [[nodiscard]] Result<void> check_part(std::size_t field, const StoredPart& part) const;
   void report_progress(double done) const {
     if (progress_) progress_(done);
   }
@@ -81,15 +82,15 @@ class FileSource : public Source {
                                      PartTaker& /*taker*/) {
     return false;
   }
-  // Reads a box of all components, as fill() reads the whole; `out` contains zeros. False: the
-  // field has to be read as a whole.
-  virtual Result<bool> fill_part(std::size_t /*field*/, std::size_t /*step*/, const Box& /*box*/,
-                                 float* /*out*/) {
+  // Reads a part with all its components (components_of()), as fill() reads the whole; `out`
+  // contains zeros. False: the field has to be read as a whole.
+  virtual Result<bool> fill_part(std::size_t /*field*/, std::size_t /*step*/,
+                                 const StoredPart& /*part*/, float* /*out*/) {
     return false;
   }
   // fill(), then finish_volume().
   Result<Volume> read(std::size_t field, std::size_t step) override;
-  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override;
 };
 
 }  // namespace windsplat::data

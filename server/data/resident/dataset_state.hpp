@@ -116,8 +116,9 @@ struct Dataset::State {
     return volume;
   }
 
-  // box null: all samples.
-  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency, const Box* box) {
+  // part null: all samples.
+  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency,
+                        const StoredPart* part) {
     turnstile.enter(urgency);
     {
       const std::lock_guard lock(mutex);
@@ -133,14 +134,17 @@ struct Dataset::State {
     const auto held =
         inputs.resize(info.stored_bytes == 0 ? info.fields[field].chunk_bytes : 0, urgency);
     const auto values = [&] {
-      return box ? source->read_part(field, step, *box) : source->read(field, step);
+      return part ? source->read_part(field, step, *part) : source->read(field, step);
     };
     auto volume = held ? guarded(info.fields[field], values) : Result<Resident>(held.error());
     {
       const std::lock_guard lock(mutex);
       loading.reset();
-      if (volume && box != nullptr) {
-        reads[{field, step}].apart += decoded_share(*box, 1, info.fields[field], info.grid.dims());
+      if (volume && part != nullptr) {
+        if (part->level == 0) {
+          reads[{field, step}].apart +=
+              decoded_share(part->box, 1, info.fields[field], info.grid.dims());
+        }
       } else if (volume) {
         const auto& read = *std::static_pointer_cast<const Volume>(*volume);
         reads[{field, step}] = {Seen{read.range, read.masked}, 0};

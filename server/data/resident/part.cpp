@@ -93,7 +93,8 @@ Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, st
   if (!minus_) {
     const auto made = get(key, bytes, [&]() -> Result<Resident> {
       const Resident whole = state_->budget->find_now({state_->owner, *index, step, ""});
-      if (!whole) return state_->read(*index, step, urgency(), &box);
+      const StoredPart samples{box};
+      if (!whole) return state_->read(*index, step, urgency(), &samples);
       return guarded(about, [&]() -> Result<Volume> {
         return cut(*std::static_pointer_cast<const Volume>(whole), box);
       });

@@ -134,7 +134,7 @@ void expect_cut(Source& source, std::size_t field, std::size_t step, const Volum
     box.first.at(a) = whole.dims.at(a) / 3;
     box.count.at(a) = std::max(1, whole.dims.at(a) / 3);
   }
-  const auto part = source.read_part(field, step, box);
+  const auto part = source.read_part(field, step, {box});
   if (!part) {  // of a service, whose answer is not among the files
     expect(part.error().kind != ErrorKind::internal, "no file may cause an internal error",
            part.error().message);

@@ -48,9 +48,9 @@ class NumberedGrid final : public Source {
     ++log_->wholes;
     return values(field, step, whole_box(info_.grid.dims()));
   }
-  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override {
-    log_->boxes.push_back(box);
-    return values(field, step, box);
+  Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override {
+    log_->boxes.push_back(part.box);
+    return values(field, step, part.box);
   }
 
  private:

@@ -52,7 +52,7 @@ void expect_boxes(const std::string& path, std::size_t fields, const std::array<
         for (int j = 1; j <= n[1] - first[1]; ++j) {
           for (int i = 1; i <= n[0] - first[0]; ++i) {
             const Box box{first, {i, j, k}};
-            const auto part = (*source)->read_part(f, step, box);
+            const auto part = (*source)->read_part(f, step, {box});
             ASSERT_TRUE(part) << part.error().message;
             ASSERT_NO_FATAL_FAILURE(expect_cut_of(*part, *whole, box));
           }
@@ -165,7 +165,7 @@ TEST(Boxes, ThatReachBeyondTheGridAreRefused) {
   for (std::size_t a = 0; a < 3; ++a) {
     Box box = whole_box((*source)->info().grid.dims());
     ++box.count.at(a);
-    const auto part = (*source)->read_part(0, 0, box);
+    const auto part = (*source)->read_part(0, 0, {box});
     ASSERT_FALSE(part);
     EXPECT_EQ(part.error().kind, ErrorKind::invalid);
     EXPECT_EQ(part.error().message, "the box " + key_of(box) + " is beyond the grid");
@@ -187,7 +187,7 @@ TEST(Boxes, OfFieldsThatAreComputedAreCutsOfTheWhole) {
     const auto whole = (*source)->read(f, 0);
     ASSERT_TRUE(whole) << whole.error().message;
     const Box box{{1, 1, 2}, {3, 2, 1}};
-    const auto part = (*source)->read_part(f, 0, box);
+    const auto part = (*source)->read_part(f, 0, {box});
     ASSERT_TRUE(part) << part.error().message;
     expect_cut_of(*part, *whole, box);
   }

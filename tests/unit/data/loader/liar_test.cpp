@@ -237,7 +237,7 @@ class FaultyBoxes : public FaultyLoader {
   Result<Volume> read_box() {
     auto source = opened();
     if (!source) return source.error();
-    auto part = (*source)->read_part(0, 0, {{1, 0, 1}, {1, 2, 1}});
+    auto part = (*source)->read_part(0, 0, {{{1, 0, 1}, {1, 2, 1}}});
     is_running_ = (*source)->process() > 0;
     return part;
   }
@@ -284,7 +284,7 @@ TEST_F(FaultyBoxes, BeyondTheGridAreNotAskedFor) {
   respond_with("send_info()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
-  const auto part = (*source)->read_part(0, 0, {{1, 0, 1}, {1, 2, 2}});
+  const auto part = (*source)->read_part(0, 0, {{{1, 0, 1}, {1, 2, 2}}});
   ASSERT_FALSE(part);
   EXPECT_EQ(part.error().kind, ErrorKind::invalid);
   EXPECT_EQ(part.error().message, "the box 1,0,1,1,2,2 is beyond the grid");

@@ -68,6 +68,13 @@ DatasetInfo good() {
   info.notes = {"resampled"};
   info.choices = {{"number", 3, {"0", "1", "2"}, "2"}};
   info.steps = {{0.5, "2000-01-01T12:00:00Z"}, {1.5, "2000-01-02T12:00:00Z"}};
+  StoredLevels stored;  // of 3 x 2 x 4 samples
+  stored.levels = {{0, 0, 0}, {1, 1, 1}};
+  stored.widths[2] = {1, 2, 3, 4};
+  stored.fields.resize(2);
+  stored.fields[1].has_levels = true;
+  stored.fields[1].ranges = {{{1, 2}, 3}, {{0, 0}, 24}};
+  info.stored = std::make_shared<const StoredLevels>(stored);
   return info;
 }
 
@@ -178,6 +185,15 @@ TEST(LoaderMessages, InfoSurvivesARoundTrip) {
   ASSERT_EQ(out->steps.size(), 2U);
   EXPECT_EQ(out->steps[1].value, 1.5);
   EXPECT_EQ(out->steps[1].text, "2000-01-02T12:00:00Z");
+  ASSERT_TRUE(out->stored);
+  EXPECT_EQ(out->stored->levels, info.stored->levels);
+  EXPECT_EQ(out->stored->widths, info.stored->widths);
+  ASSERT_EQ(out->stored->fields.size(), 2U);
+  EXPECT_FALSE(out->stored->fields[0].has_levels);
+  EXPECT_TRUE(out->stored->fields[1].has_levels);
+  ASSERT_NE(stored_range(*out, 1, 0), nullptr);
+  EXPECT_EQ(stored_range(*out, 1, 0)->range, (std::array{1.0F, 2.0F}));
+  EXPECT_EQ(stored_range(*out, 1, 1)->masked, 24);
 }
 
 TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
@@ -385,13 +401,14 @@ TEST(LoaderMessages, ChunksThatNoGridHasAreRefused) {
 
 TEST(LoaderMessages, WantedSurvivesARoundTrip) {
   const DatasetInfo info = good();
-  for (const Wanted& wanted : {Wanted{0, 1, whole_box({3, 2, 4}), 2, true},
-                               Wanted{1, 0, {{1, 0, 2}, {2, 1, 2}}, 0, false}}) {
+  for (const Wanted& wanted : {Wanted{0, 1, {whole_box({3, 2, 4})}, 2, true},
+                               Wanted{1, 0, {{{1, 0, 2}, {2, 1, 2}}}, 0, false},
+                               Wanted{1, 1, {{{1, 0, 0}, {1, 1, 2}}, 1, StoredAs::two_values}}}) {
     const auto out = decode_wanted(encode_wanted(wanted), info);
     ASSERT_TRUE(out) << out.error().message;
     EXPECT_EQ(out->field, wanted.field);
     EXPECT_EQ(out->step, wanted.step);
-    EXPECT_EQ(out->box, wanted.box);
+    EXPECT_EQ(out->part, wanted.part);
     EXPECT_EQ(out->window_layers, wanted.window_layers);
     EXPECT_EQ(out->keeps_memory, wanted.keeps_memory);
   }
@@ -402,13 +419,37 @@ TEST(LoaderMessages, WhatTheDatasetLacksIsNotRead) {
   const std::vector<std::pair<const char*, void (*)(Wanted&)>> faults{
       {"a field beyond the last", [](Wanted& w) { w.field = 2; }},
       {"a step beyond the last", [](Wanted& w) { w.step = 2; }},
-      {"a box that begins before the grid", [](Wanted& w) { w.box.first[0] = -1; }},
-      {"a box that ends behind the grid", [](Wanted& w) { w.box.count[2] = 3; }},
-      {"a box without samples", [](Wanted& w) { w.box.count[1] = 0; }},
+      {"a box that begins before the grid", [](Wanted& w) { w.part.box.first[0] = -1; }},
+      {"a box that ends behind the grid", [](Wanted& w) { w.part.box.count[2] = 3; }},
+      {"a box without samples", [](Wanted& w) { w.part.box.count[1] = 0; }},
+      {"a level beyond the last",
+       [](Wanted& w) {
+         w.part = {{}, 2, StoredAs::two_values};
+       }},
+      {"draws of a scalar",
+       [](Wanted& w) {
+         w.part = {{}, 1, StoredAs::drawn};
+       }},
+      {"samples of a level",
+       [](Wanted& w) {
+         w.part = {{}, 1, StoredAs::samples};
+       }},
+      {"two values of level 0",
+       [](Wanted& w) {
+         w.part = {{}, 0, StoredAs::two_values};
+       }},
+      {"what nothing is stored as",
+       [](Wanted& w) {
+         w.part = {{}, 1, static_cast<StoredAs>(9)};
+       }},
+      {"a box beyond its level",
+       [](Wanted& w) {
+         w.part = {{{1, 0, 0}, {2, 1, 1}}, 1, StoredAs::two_values};
+       }},
       {"a box in parts", [](Wanted& w) { w.window_layers = 1; }},
       {"a box of a field that is not read by boxes", [](Wanted& w) { w.field = 0; }},
   };
-  const Wanted fine{1, 0, {{1, 0, 2}, {2, 1, 2}}, 0, false};
+  const Wanted fine{1, 0, {{{1, 0, 2}, {2, 1, 2}}}, 0, false};
   ASSERT_TRUE(decode_wanted(encode_wanted(fine), info));
   for (const auto& [what, change] : faults) {
     Wanted wanted = fine;

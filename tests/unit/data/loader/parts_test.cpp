@@ -152,7 +152,7 @@ TEST_F(LoaderOfParts, BoxFetchesTheBytesOfItsRowsAlone) {
   const Box box{{10, 20, 5}, {4, 3, 2}};
   const auto expected = whole->read(0, 0);
   fetched_->bytes = 0;
-  const auto got = parts->read_part(0, 0, box);
+  const auto got = parts->read_part(0, 0, {box});
   ASSERT_TRUE(expected && got) << (got ? "" : got.error().message);
   expect_same(*got, cut(*expected, box));
   EXPECT_GT(fetched_->bytes, 0U);

@@ -62,7 +62,7 @@ TEST_F(Loader, BoxesAreCutsOfTheWhole) {
         ASSERT_TRUE(whole) << whole.error().message;
         for (const Box& box : {Box{{1, 0, 0}, {3, 2, 2}}, Box{{3, 2, 1}, {1, 1, 1}},
                                Box{{0, 0, 0}, {4, 3, 2}}, Box{{0, 1, 0}, {2, 1, 2}}}) {
-          const auto part = source->read_part(f, step, box);
+          const auto part = source->read_part(f, step, {box});
           ASSERT_TRUE(part) << part.error().message;
           expect_same(*part, cut(*whole, box));
         }
