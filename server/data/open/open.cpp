@@ -35,6 +35,7 @@
 #include "server/data/formats/nrrd/file.hpp"
 #include "server/data/formats/raw/file.hpp"
 #include "server/data/formats/vtk/source.hpp"
+#include "server/data/formats/zarr/levels/source.hpp"
 #include "server/data/formats/zarr/store.hpp"
 #include "server/data/model/axis_check.hpp"
 #include "server/data/model/source.hpp"
@@ -150,6 +151,16 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
         "\"windsplat\": \"raw\" or \"files\" in their first 4096 bytes");
   }
   return as_arrays(*files, netcdf::File::open(std::move(*input), files->location().inside));
+}
+
+// The levels of a store are those of its level 0 as a whole.
+SourceResult open_store(const std::shared_ptr<Files>& files) {
+  std::unique_ptr<zarr::LevelStore> levels;
+  auto store = zarr::Store::open(files, &levels);
+  if (!store) return store.error();
+  auto finest = source_of(*files, as_arrays(*files, std::move(store)));
+  if (!finest || levels == nullptr || !files->location().selection.empty()) return finest;
+  return zarr::with_levels(std::move(*finest), std::move(levels));
 }
 
 using ArraysResult = Result<std::unique_ptr<cf::ArrayFile>>;
@@ -333,7 +344,7 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
     }
     return vtk::open(files);  // a block may follow '#/'
   }
-  if (zarr::is_store(*files)) return source_of(*files, as_arrays(*files, zarr::Store::open(files)));
+  if (zarr::is_store(*files)) return open_store(files);
   if (files->location().kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
                       in_quotes(files->location().stem) +

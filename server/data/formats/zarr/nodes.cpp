@@ -15,15 +15,6 @@ namespace {
 constexpr std::uint64_t json_bytes_max = std::uint64_t{8} << 20;
 constexpr std::size_t arrays_max = 8192;
 
-bool is_plain_path(std::string_view path) {
-  for (;;) {
-    const std::size_t slash = path.find('/');
-    if (!is_plain_name(path.substr(0, slash))) return false;
-    if (slash == std::string_view::npos) return true;
-    path.remove_prefix(slash + 1);
-  }
-}
-
 class Search {
  public:
   explicit Search(Files& files) : files_(files) {}
@@ -41,8 +32,13 @@ class Search {
     auto attributes = attributes_of("");
     if (!attributes) return attributes.error();
     out_.attributes = std::move(*attributes);
-    out_.multiscale = multiscale_of(out_.attributes);
-    auto done = out_.multiscale ? search_levels() : search("", {});
+    auto levels = level_names(out_.attributes);
+    if (!levels) return levels.error();
+    out_.levels = std::move(*levels);
+    if (!out_.levels) out_.multiscale = multiscale_of(out_.attributes);
+    auto done = out_.levels       ? search_stored_levels()
+                : out_.multiscale ? search_levels()
+                                  : search("", {});
     if (!done) return done.error();
     return std::move(out_);
   }
@@ -204,9 +200,43 @@ class Search {
     return search("", {levels.begin(), levels.end()});
   }
 
+  Result<void> search_stored_levels() {
+    const LevelNames& names = *out_.levels;
+    if (auto done = search(names.levels[0].path + '/', {}); !done) return done;
+    std::vector<std::string> paths;
+    for (const LevelNames::Field& field : names.fields) {
+      if (!field.ranges.empty()) {
+        paths.push_back(range_path(field));
+        paths.push_back(masked_path(field));
+      }
+      if (field.as == LevelNames::Field::As::nothing) continue;
+      for (std::size_t n = 1; n < names.levels.size(); ++n) {
+        for (const bool strided : {false, true}) {
+          if (strided && static_cast<int>(n) > field.strided) continue;
+          const auto more = level_paths(names, field, n, strided);
+          paths.insert(paths.end(), more.begin(), more.end());
+        }
+      }
+    }
+    for (const std::string& path : names.widths) {
+      if (!path.empty()) paths.push_back(path);
+    }
+    for (const std::string& path : paths) {
+      const auto kind = kind_of(path + '/');
+      if (!kind) return kind.error();
+      if (*kind != Kind::array) return broken_store(path, "the array is missing");
+      if (auto done = add(path, path + '/', out_.level_arrays); !done) return done;
+    }
+    return {};
+  }
+
   Result<void> add(const std::string& name, const std::string& path) {
     if (!is_plain_name(name)) return broken_store(name, "is not a valid array name");
-    if (out_.arrays.size() >= arrays_max) {
+    return add(name, path, out_.arrays);
+  }
+
+  Result<void> add(const std::string& name, const std::string& path, std::vector<Node>& to) {
+    if (out_.arrays.size() + out_.level_arrays.size() >= arrays_max) {
       return make_error(ErrorKind::bad_data,
                         "it has more than " + std::to_string(arrays_max) + " arrays");
     }
@@ -214,7 +244,7 @@ class Search {
     if (!metadata) return metadata.error();
     auto attributes = attributes_of(path);
     if (!attributes) return attributes.error();
-    out_.arrays.push_back({path, name, std::move(*metadata), std::move(*attributes)});
+    to.push_back({path, name, std::move(*metadata), std::move(*attributes)});
     return {};
   }
 
@@ -236,6 +266,15 @@ Error broken_store(const std::string& place, const std::string& what) {
 bool is_plain_name(std::string_view name) {
   return !name.empty() && name != "." && name != ".." && name.size() <= 255 &&
          name.find('/') == std::string_view::npos && name.find('\0') == std::string_view::npos;
+}
+
+bool is_plain_path(std::string_view path) {
+  for (;;) {
+    const std::size_t slash = path.find('/');
+    if (!is_plain_name(path.substr(0, slash))) return false;
+    if (slash == std::string_view::npos) return true;
+    path.remove_prefix(slash + 1);
+  }
 }
 
 Result<Nodes> find_nodes(Files& files) { return Search(files).run(); }

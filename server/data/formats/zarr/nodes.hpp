@@ -3,11 +3,13 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/formats/zarr/json.hpp"
+#include "server/data/formats/zarr/levels/names.hpp"
 #include "server/data/formats/zarr/multiscale.hpp"
 
 namespace windsplat::data::zarr {
@@ -25,7 +27,9 @@ struct Nodes {
   std::vector<std::string> groups;  // not searched
   Json attributes;                  // of the root
   std::optional<Multiscale> multiscale;
-  std::string identity;  // of the files read
+  std::optional<LevelNames> levels;  // in place of multiscale
+  std::vector<Node> level_arrays;    // of all that `levels` names beside level 0
+  std::string identity;              // of the files read
 };
 
 // Errors: bad_data.
@@ -35,5 +39,7 @@ Error broken_store(const std::string& place, const std::string& what);
 
 // Whether a name of a store may be the name of a file.
 bool is_plain_name(std::string_view name);
+// The same of names with '/' between them.
+bool is_plain_path(std::string_view path);
 
 }  // namespace windsplat::data::zarr

@@ -126,6 +126,16 @@ class StoreScan {
       out_.arrays.push_back(std::move(array));
     }
     if (nodes->multiscale) tell_level(*nodes->multiscale);
+    out_.levels = std::move(nodes->levels);
+    for (Node& node : nodes->level_arrays) {
+      auto metadata = nodes->version == 2 ? parse_v2(node.metadata) : parse_v3(node.metadata);
+      if (!metadata) return broken_store(node.name, metadata.error().message);
+      Array array;
+      array.path = std::move(node.path);
+      array.name = std::move(node.name);
+      array.metadata = std::move(*metadata);
+      out_.level_arrays.push_back(std::move(array));
+    }
     return {};
   }
 
@@ -233,8 +243,9 @@ class StoreScan {
   }
 
   // Looks at the files of chunks, and counts the absent ones; not of a store that is fetched, whose
-  // chunks are fetched when they are read.
+  // chunks are fetched when they are read, or of one that says what it contains.
   void identify() {
+    if (out_.levels && !out_.levels->contents.empty()) return;
     if (files_.location().fetched) {
       out_.file.notes.emplace_back(
           "absent chunks are not counted, as chunks are fetched when they are read");

@@ -10,6 +10,7 @@
 #include "server/base/error.hpp"
 #include "server/data/cf/contents.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/formats/zarr/levels/names.hpp"
 #include "server/data/formats/zarr/metadata.hpp"
 
 namespace windsplat::data::zarr {
@@ -45,11 +46,13 @@ struct Array {
 struct StoreContents {
   int version = 2;
   std::string name;
-  // Derived from the metadata and the files of all chunks, or 4096 evenly
-  // distributed ones if there are more.
+  // Derived from the metadata and the files of all chunks, or 4096 evenly distributed ones if there
+  // are more; of a store with levels whose attribute says what it contains, from the metadata.
   std::string identity;
   std::vector<Array> arrays;  // parallel to the variables
   FileContents file;
+  std::optional<LevelNames> levels;
+  std::vector<Array> level_arrays;  // all that `levels` names, by path as their name
 };
 
 // Errors: bad_data.

@@ -16,9 +16,24 @@ bool is_store(Files& files) {
          files.exists("zarr.json");
 }
 
-Result<std::unique_ptr<Store>> Store::open(std::shared_ptr<Files> files) {
+Result<std::unique_ptr<Store>> Store::open(std::shared_ptr<Files> files,
+                                           std::unique_ptr<LevelStore>* levels) {
   auto contents = scan_store(*files);
   if (!contents) return contents.error();
+  if (levels != nullptr && contents->levels) {
+    auto out = std::make_unique<LevelStore>();
+    out->names = std::move(*contents->levels);
+    StoreContents others;
+    others.version = contents->version;
+    others.name = contents->name;
+    others.arrays = std::move(contents->level_arrays);
+    for (const Array& array : others.arrays) {
+      out->indices.emplace(array.name, static_cast<int>(out->metadata.size()));
+      out->metadata.push_back(array.metadata);
+    }
+    out->arrays.reset(new Store(files, std::move(others)));
+    *levels = std::move(out);
+  }
   return std::unique_ptr<Store>(new Store(std::move(files), std::move(*contents)));
 }
 

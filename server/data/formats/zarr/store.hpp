@@ -1,6 +1,7 @@
 // A folder that is a Zarr store of version 2 or 3. Chunks -> blocks of numbers.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -21,12 +22,16 @@ namespace windsplat::data::zarr {
 // Whether a folder is a Zarr store.
 bool is_store(Files& files);
 
+struct LevelStore;
+
 // Conventions of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and in version 2 fill_value is
 // _FillValue.
 class Store final : public cf::ArrayFile {
  public:
-  // Errors: bad_data.
-  static Result<std::unique_ptr<Store>> open(std::shared_ptr<Files> files);
+  // `levels`: receives the other levels of a store with levels, null of any other. Errors:
+  // bad_data.
+  static Result<std::unique_ptr<Store>> open(std::shared_ptr<Files> files,
+                                             std::unique_ptr<LevelStore>* levels = nullptr);
 
   [[nodiscard]] const FileContents& contents() const override { return contents_.file; }
   [[nodiscard]] const std::string& name() const override { return contents_.name; }
@@ -87,6 +92,14 @@ class Store final : public cf::ArrayFile {
   mutable std::mutex mutex_;  // guards what is cached
   mutable Recent<Chunk> kept_;
   mutable Recent<OpenShard> shards_;
+};
+
+// The arrays that the attribute of a store with levels names.
+struct LevelStore {
+  LevelNames names;
+  std::vector<ArrayMetadata> metadata;  // by the index of an array in `arrays`
+  std::map<std::string, int> indices;   // by path
+  std::unique_ptr<const Store> arrays;
 };
 
 }  // namespace windsplat::data::zarr
