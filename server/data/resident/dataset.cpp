@@ -2,6 +2,7 @@
 #include "server/data/resident/dataset.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "server/data/model/digest.hpp"
@@ -79,7 +80,8 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
 
 Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
                                  const Coarsening& how) {
-  return derived(field, step, reduction(field, how));
+  const auto stored = stored_reduction(field, how);
+  return derived(field, step, stored ? *stored : reduction(field, how));
 }
 
 Derivation Dataset::reduction(const std::string& field, const Coarsening& how) const {
@@ -89,6 +91,66 @@ Derivation Dataset::reduction(const std::string& field, const Coarsening& how) c
             state->add(&Counts::levels);
             return coarsen(fine, how);
           }};
+}
+
+std::optional<Derivation> Dataset::stored_reduction(const std::string& field,
+                                                    const Coarsening& how) const {
+  const DatasetInfo& info = state_->info;
+  const Result<std::size_t> index = state_->find(field, 0);
+  if (!index || minus_ || how.halvings == std::array{0, 0, 0}) return std::nullopt;
+  Derivation out = reduction(field, how);
+  if (auto level = stored_level(info, *index, how)) {
+    out.make = nullptr;
+    out.stored = std::move(level);
+    return out;
+  }
+  if (how.reduction != Reduction::drawn) return std::nullopt;
+  auto middles = stored_middles(info, *index, how.stride);
+  if (!middles) return std::nullopt;
+  Derivation from;
+  from.variant = "strided " + std::to_string(how.stride);
+  from.bytes = bytes_beside_level(field, how);
+  from.stored = std::move(middles);
+  out.from = std::make_shared<const Derivation>(std::move(from));
+  out.make = [state = state_, how, dims = info.grid.dims()](const Volume& strided) {
+    state->add(&Counts::levels);
+    return draw(strided, how, dims);
+  };
+  return out;
+}
+
+std::uint64_t Dataset::bytes_beside_level(const std::string& field, const Coarsening& how) const {
+  const DatasetInfo& info = state_->info;
+  const Result<std::size_t> index = state_->find(field, 0);
+  if (!index) return 0;
+  if (minus_) return loading_bytes(field);
+  if (stored_level(info, *index, how)) return 0;
+  const auto middles =
+      how.reduction == Reduction::drawn ? stored_middles(info, *index, how.stride) : std::nullopt;
+  if (!middles) return loading_bytes(field);
+  return middles->box.samples() * info.fields[*index].components.size() * sizeof(float);
+}
+
+std::uint64_t Dataset::least_bytes(const std::string& field) const {
+  const DatasetInfo& info = state_->info;
+  const std::uint64_t whole = loading_bytes(field);
+  const Result<std::size_t> index = state_->find(field, 0);
+  if (!index || minus_ || info.stored == nullptr) return whole;
+  const bool is_vector = info.fields[*index].kind == FieldKind::vector;
+  const StoredAs as = is_vector ? StoredAs::drawn : StoredAs::two_values;
+  const auto dims = stored_dims(info, *index, info.stored->levels.size() - 1, as);
+  if (!dims) return whole;
+  const auto values = static_cast<std::uint64_t>(components_of(info.fields[*index], as));
+  return std::min(whole, whole_box(*dims).samples() * values * sizeof(float));
+}
+
+bool Dataset::fits_in_full(const std::vector<std::string>& fields) const {
+  const std::set<std::string> counted(fields.begin(), fields.end());
+  std::uint64_t bytes = 0;
+  for (const std::string& field : counted) bytes += loading_bytes(field);
+  if (state_->info.stored == nullptr) return is_within_limit(bytes);
+  return bytes + state_->bytes_beside(reading_bytes_of_store(state_->info, fields)) <=
+         state_->budget->bytes_max();
 }
 
 Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
@@ -104,6 +166,10 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   if (const auto there = state_->budget->find(key)) {
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
+  }
+  if (how.stored) {
+    return as_volume(
+        get(key, how.bytes, [&] { return state_->read(*index, step, urgency(), &*how.stored); }));
   }
   // Keep references, so that no volume is evicted before the result is computed from it.
   std::vector<VolumePtr> others;
@@ -238,7 +304,9 @@ std::optional<Dataset::Seen> Dataset::seen(const std::string& field, std::size_t
   if (!index) return std::nullopt;
   const std::lock_guard lock(state_->mutex);
   const auto found = state_->reads.find({*index, step});
-  return found == state_->reads.end() ? std::nullopt : found->second.seen;
+  if (found != state_->reads.end() && found->second.seen) return found->second.seen;
+  const StoredRange* const stored = stored_range(state_->info, *index, step);
+  return stored == nullptr ? std::nullopt : std::optional(Seen{stored->range, stored->masked});
 }
 
 Dataset::Counts Dataset::counts() const {
@@ -257,7 +325,7 @@ std::optional<Dataset::Loading> Dataset::loading() const {
 
 Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
   for (const std::string& field : fields) {
-    const std::uint64_t bytes = loading_bytes(field);
+    const std::uint64_t bytes = least_bytes(field);
     if (is_within_limit(bytes)) continue;
     return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
                                                     " at a step; " + state_->budget->limit_text() +

@@ -15,6 +15,7 @@
 #include "server/data/model/box.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/data/model/source.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/resident/budget.hpp"
 
 namespace windsplat::data {
@@ -41,6 +42,8 @@ struct Derivation {
   std::vector<Input> others = {};
   std::function<Volume(const Volume&, const std::vector<std::shared_ptr<const Volume>>& others)>
       make_with = nullptr;
+  // The source has the result stored: it is read, and neither made nor are its inputs loaded.
+  std::optional<StoredPart> stored = std::nullopt;
 };
 
 // One opened dataset. A handle: copies refer to the same dataset. Thread-safe.
@@ -84,8 +87,22 @@ class Dataset {
   // The same for any volume that is computed from the field.
   Result<std::shared_ptr<const Volume>> derived(const std::string& field, std::size_t step,
                                                 const Derivation& how);
-  // The computation of level().
+  // The computation of level() from the field, or from what is derived from it.
   [[nodiscard]] Derivation reduction(const std::string& field, const Coarsening& how) const;
+  // The same by what the source has stored: the level itself, or the middles of kernels from which
+  // it is drawn. It has the bits of reduction(), and its variant. nullopt: neither is stored.
+  [[nodiscard]] std::optional<Derivation> stored_reduction(const std::string& field,
+                                                           const Coarsening& how) const;
+  // Bytes of what a reduction of a field is computed from: by stored_reduction(), or by reduction()
+  // if there is none.
+  [[nodiscard]] std::uint64_t bytes_beside_level(const std::string& field,
+                                                 const Coarsening& how) const;
+  // Bytes of the least of a field that can be drawn: of its coarsest stored level, or those of
+  // loading_bytes().
+  [[nodiscard]] std::uint64_t least_bytes(const std::string& field) const;
+  // Whether the fields at full detail fit into the memory limit together, beside a loader that
+  // reads them.
+  [[nodiscard]] bool fits_in_full(const std::vector<std::string>& fields) const;
 
   // The result of make(), which takes `bytes` bytes and follows from the description of the dataset
   // and `variant`: computed on first need, shared, counted and evicted like a level. A make() that
@@ -165,7 +182,8 @@ class Dataset {
   // Frees the read caches of the source if nothing was read for `idle_s`.
   void release_idle(double idle_s);
 
-  // Range and masked count of a field at a step that was loaded before; nullopt: never loaded.
+  // Range and masked count of a field at a step that was loaded before, or that the source has
+  // stored; nullopt: never loaded.
   struct Seen {
     std::array<float, 2> range{};
     std::int64_t masked = 0;

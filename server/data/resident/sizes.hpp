@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <set>
@@ -10,6 +11,7 @@
 
 #include "server/data/model/box.hpp"
 #include "server/data/model/dataset_info.hpp"
+#include "server/data/model/stored.hpp"
 
 namespace windsplat::data {
 
@@ -22,6 +24,10 @@ inline std::uint64_t bytes_of(const DatasetInfo& info) {
   }
   if (info.grid.ground) bytes += info.grid.ground->heights.size() * sizeof(float);
   for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
+  if (info.stored) {
+    for (const StoredField& of : info.stored->fields)
+      bytes += of.ranges.size() * sizeof(StoredRange);
+  }
   return bytes;
 }
 
@@ -65,6 +71,23 @@ inline std::uint64_t reading_bytes(const DatasetInfo& info,
 inline std::uint64_t reading_box_bytes(const FieldInfo& field) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;
   return field.chunk_bytes <= sizeof(double) ? 32 * mib : 48 * mib + 2 * field.chunk_bytes;
+}
+
+// The same of a store with levels, whose chunks are small and kept until all of their samples are
+// read, up to 64 MiB.
+inline std::uint64_t reading_bytes_of_store(const DatasetInfo& info,
+                                            const std::vector<std::string>& fields) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  const std::array<int, 3> dims = info.grid.dims();
+  const std::uint64_t layer =
+      static_cast<std::uint64_t>(dims[0]) * static_cast<std::uint64_t>(dims[1]) * sizeof(float);
+  std::uint64_t kept = 0;
+  for (const std::string& name : fields) {
+    const FieldInfo* const field = info.find(name);
+    const int layers = field == nullptr ? 0 : field->box_chunk[2];
+    kept = std::max(kept, static_cast<std::uint64_t>(layers) * layer);
+  }
+  return 16 * mib + std::min(64 * mib, kept);
 }
 
 }  // namespace windsplat::data
