@@ -14,6 +14,7 @@
 #include "server/cli/open_store.hpp"
 #include "server/cli/progress.hpp"
 #include "server/data/bytes/decode_limits.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/resident/budget.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/scene/describe.hpp"
@@ -64,6 +65,13 @@ struct Choice {
   std::string note;
 };
 
+bool has_all_ranges(const data::DatasetInfo& info) {
+  for (std::size_t f = 0; f < info.fields.size(); ++f) {
+    if (!info.fields[f].derived && data::stored_range(info, f, 0) == nullptr) return false;
+  }
+  return true;
+}
+
 Choice choose_ranges(const data::DatasetInfo& info, std::uint64_t bytes_when_resident) {
   const Cost cost = cost_of_step(info);
   const auto steps = static_cast<double>(info.steps.size());
@@ -74,6 +82,7 @@ Choice choose_ranges(const data::DatasetInfo& info, std::uint64_t bytes_when_res
   const auto memory_max = static_cast<double>(data::range_memory_max(info.stored_bytes));
   if (!is_sample && (cost.decoded > decoded_max || cost.memory > memory_max)) {
     const bool by_size = cost.decoded > decoded_max;
+    if (has_all_ranges(info)) return {scene::RangesOf::none, ""};
     return {scene::RangesOf::none,
             "ranges are not read: a step " +
                 (by_size ? "decodes to " + size_text(cost.decoded) + beyond + size_text(decoded_max)

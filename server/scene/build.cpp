@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "protocol/view/shown.hpp"
@@ -13,6 +12,7 @@
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
 #include "server/scene/earth/ground.hpp"
+#include "server/scene/level/choice.hpp"
 #include "server/scene/lines/mark.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/region/crop.hpp"
@@ -26,7 +26,6 @@ namespace windsplat::scene {
 namespace {
 
 using protocol::absorbs;
-using protocol::has_strided_lines;
 using protocol::is_drawn_in_full;
 using protocol::is_section;
 using protocol::shows_lines;
@@ -110,25 +109,6 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.color.true_colors ? 0 : from.magnitude_intensity;
 }
 
-// Of lines.
-data::Coarsening drawn(data::Coarsening how, const View& view) {
-  how.reduction = data::Reduction::drawn;
-  how.stride = view.vector.stride.value();
-  return how;
-}
-
-// Of a field of that many components on the lattice, reduced in that way.
-std::uint64_t level_bytes(const Lattice& lattice, std::size_t components,
-                          const data::Coarsening& how) {
-  auto values = static_cast<int>(components);
-  if (how.halvings != std::array{0, 0, 0}) values = reduced_components(values, how.reduction);
-  std::uint64_t bytes = sizeof(float) * static_cast<std::uint64_t>(values);
-  for (std::size_t a = 0; a < 3; ++a) {
-    bytes *= static_cast<std::uint64_t>(data::halved(lattice.dims[a], how.halvings[a]));
-  }
-  return bytes;
-}
-
 // Fields of the level or section that is rendered. Media have two values per sample. Lines are
 // those of samples, and so is the scalar that colours them: the mean of vectors that differ is
 // shorter than each of them, and would be held against a least magnitude of the samples.
@@ -157,7 +137,9 @@ struct Fields {
   [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how,
                             const data::Derivation& kept) const {
     if (section == nullptr) {
-      data::Derivation level = dataset.reduction(name, how);
+      // What a region keeps is not what is stored.
+      auto stored = kept.variant.empty() ? dataset.stored_reduction(name, how) : std::nullopt;
+      data::Derivation level = stored ? std::move(*stored) : dataset.reduction(name, how);
       level.bytes = level_bytes(completed.lattice(), components_of(name), how);
       return {name, computed_from(kept, std::move(level))};
     }
@@ -181,68 +163,6 @@ struct NeededScene {
   std::optional<NeededLines> lines;
   std::vector<NeededMedium> media;
 };
-
-MergeLimits merge_limits(const View& view) {
-  MergeLimits limits;
-  if (!shows_lines(view) || has_strided_lines(view)) return limits;  // a halving merges none
-  VectorLayer layer;
-  set_radii(view.vector, view.image.height, layer);
-  limits.samples = std::min(limits.samples, 1 / layer.opacity);
-  return limits;
-}
-
-// A field and how it is reduced.
-struct Shown {
-  std::string field;
-  data::Coarsening coarsening;
-};
-
-std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
-  std::vector<Shown> shown;
-  if (shows_lines(view)) {
-    shown.push_back({view.vector.field.name, drawn(how, view)});
-    if (view.vector.color.by == protocol::ColorBy::scalar) {
-      shown.push_back({view.vector.color.field.value(), drawn(how, view)});
-    }
-  }
-  for (const protocol::ScalarView& scalar : *view.scalars) {
-    if (absorbs(scalar)) shown.push_back({scalar.field, how});
-  }
-  return shown;
-}
-
-// Whether the levels of all fields fit into memory beside the largest volume from which one is
-// reduced, and what a region keeps of it. It depends on sizes alone, so that a view has the same
-// level whatever is resident.
-bool are_within_limit(const std::vector<Shown>& shown, const View& view, const Lattice& lattice,
-                      const data::Dataset& dataset) {
-  const bool kept = is_cropped(view.region) || !view.region.where.empty();
-  std::set<std::pair<std::string, data::Reduction>> counted;
-  std::uint64_t levels = 0;
-  std::uint64_t largest = 0;
-  for (const auto& [field, how] : shown) {
-    if (!counted.emplace(field, how.reduction).second) continue;
-    const std::size_t components = dataset.info().find(field)->components.size();
-    levels += level_bytes(lattice, components, how);
-    const std::uint64_t part = kept ? level_bytes(lattice, components, {}) : 0;
-    largest = std::max(largest, dataset.loading_bytes(field) + part);
-  }
-  return dataset.is_within_limit(levels + largest);
-}
-
-// The fraction of the requested detail that the picture can show. If there is memory for the
-// volumes but not for their levels, every sample is drawn; the report of the frame says so.
-std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
-                             int coarser, const data::Dataset& dataset) {
-  constexpr std::array full{0, 0, 0};
-  if (is_drawn_in_full(view)) return full;
-  const auto slice = slice_of(view.geometry, lattice);
-  const auto level = coarser_level(
-      lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)), coarser);
-  if (level == full) return full;
-  const auto shown = shown_at(view, coarsening_of(lattice, level));
-  return are_within_limit(shown, view, lattice, dataset) ? level : full;
-}
 
 // The lines of a plane, whose vectors and colours do not depend on the axes of the grid.
 void set_plane(const Section& plane, const std::string& field, const data::Derivation& kept,
@@ -393,23 +313,6 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
 }
 
 }  // namespace
-
-std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset) {
-  return level_for(completed.view(), completed.camera(), completed.lattice(), completed.coarser(),
-                   dataset);
-}
-
-std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset) {
-  if (outline.bent) return {0, 0, 0};
-  return level_for(outline.view, outline.camera, outline.lattice, 0, dataset);
-}
-
-std::array<int, 3> level_at(const CompletedView& completed, int height,
-                            const data::Dataset& dataset) {
-  Camera camera = completed.camera();
-  camera.height = height;
-  return level_for(completed.view(), camera, completed.lattice(), 0, dataset);
-}
 
 Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
   const View& view = completed.view();

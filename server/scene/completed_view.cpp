@@ -225,6 +225,20 @@ Result<void> check_section(const View& view, const Lattice& lattice) {
   return section ? Result<void>() : section.error();
 }
 
+// Of a store that exceeds the memory, lines are drawn from what it has of them.
+void set_stored_stride(View& view, const Lattice& lattice, const data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  if (view.vector.stride || info.stored == nullptr || dataset.subtrahend()) return;
+  const FieldChoice& choice = view.vector.field;
+  if (choice.kind == FieldChoice::Kind::none) return;
+  const data::FieldInfo* const field =
+      choice.kind == FieldChoice::Kind::named ? info.find(choice.name) : default_vector(info);
+  if (field == nullptr) return;
+  const int stride = spacing_of(view.geometry, lattice).stride;
+  const int stored = stored_stride(stride, field->name, dataset);
+  if (stored != stride) view.vector.stride = stored;
+}
+
 std::atomic<std::uint64_t> completed_views{0};
 
 }  // namespace
@@ -246,6 +260,7 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   if (!placed) return placed.error();
   const Lattice& lattice = (*placed)->lattice;
   if (auto ok = check_section(full, lattice); !ok) return ok.error();
+  set_stored_stride(full, lattice, dataset);
   const auto camera = complete_from_description(full, info, lattice);
   if (!camera) return camera.error();
   if (auto ok = complete_from_data(full, *camera, **placed, dataset); !ok) return ok.error();
@@ -293,7 +308,7 @@ Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& da
   if (vector.field.kind != FieldChoice::Kind::named || !(least > 0)) return std::string();
   const auto share = from_first_step(
       dataset, "hidden", vector.field.name, {least},
-      [&](const data::Volume& volume) { return std::vector{hidden_share(least, volume)}; });
+      [&](const DefaultSamples& of) { return std::vector{hidden_share(least, *of.volume)}; });
   if (!share) return share.error();
   if (share->front() < told_least) return std::string();
   const auto step = step_with_values(dataset, vector.field.name);

@@ -16,6 +16,7 @@
 #include "server/scene/bend.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/defaults/first_step.hpp"
 #include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
@@ -87,6 +88,10 @@ Result<void> add_range(data::Dataset& dataset, std::size_t steps,
                        protocol::FieldDescription& field) {
   data::FieldRange over;
   for (std::size_t step = 0; step < steps; ++step) {
+    if (const auto* const stored = stored_range(dataset, field.name, step)) {
+      over.add(*stored, dataset.info().grid.samples());
+      continue;
+    }
     const auto volume = dataset.volume(field.name, step);
     if (!volume) return volume.error();
     over.add(**volume);
@@ -94,6 +99,19 @@ Result<void> add_range(data::Dataset& dataset, std::size_t steps,
   field.range = over.range;
   field.masked = over.masked;
   return {};
+}
+
+// Over all steps, if the source has stored it.
+void add_stored_range(const data::Dataset& dataset, protocol::FieldDescription& field) {
+  data::FieldRange over;
+  for (std::size_t step = 0; step < dataset.info().steps.size(); ++step) {
+    const auto* const stored = stored_range(dataset, field.name, step);
+    if (stored == nullptr) return;
+    over.add(*stored, dataset.info().grid.samples());
+  }
+  field.range_of = "all";
+  field.range = over.range;
+  field.masked = over.masked;
 }
 
 // Of a view of vectors alone: the scalars that it leaves out, since none is known to be a cloud, a
@@ -237,6 +255,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
                          " is not known: " + ok.error().message);
       }
     }
+    if (ranges == RangesOf::none) add_stored_range(dataset, description);
     if (!field.derived) components += field.components.size();
     out.fields.push_back(std::move(description));
   }

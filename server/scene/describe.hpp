@@ -14,7 +14,7 @@ namespace windsplat::scene {
 Result<std::string> why_not_shown(const data::Dataset& dataset);
 
 enum class RangesOf {
-  none,        // loads nothing; no ranges, masked counts or defaultView
+  none,        // loads nothing; no defaultView, ranges and masked counts only if they are stored
   seen,        // "rangeOf": "step"; loads the fields of defaultView, unless it is not shown, and
                // adds the ranges of all fields that have been loaded at the first step
   first_step,  // "rangeOf": "step"

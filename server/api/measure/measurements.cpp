@@ -223,6 +223,19 @@ http::Response step_range(const Subject& subject, std::size_t step) {
   return json_response(protocol::encode_range(out));
 }
 
+// Over all steps, if the source has stored it.
+std::optional<data::FieldRange> stored_range(const data::DatasetInfo& info,
+                                             const data::FieldInfo& field) {
+  const auto index = static_cast<std::size_t>(info.find(field.name) - info.fields.data());
+  data::FieldRange out;
+  for (std::size_t step = 0; step < info.steps.size(); ++step) {
+    const auto* const stored = data::stored_range(info, index, step);
+    if (stored == nullptr) return std::nullopt;
+    out.add(*stored, info.grid.samples());
+  }
+  return out;
+}
+
 void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::Request& request,
                          http::Reply reply) {
   auto of = subject.dataset->shared_info();
@@ -230,6 +243,10 @@ void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::R
   const auto known = is_difference ? std::nullopt : backend.ranges.find(of, subject.field.name);
   if (known) {
     reply(range_response(*known, "all"));
+    return;
+  }
+  if (const auto stored = is_difference ? std::nullopt : stored_range(*of, subject.field)) {
+    reply(range_response(*stored, "all"));
     return;
   }
   const auto pass = pass_over(std::move(subject), request, std::move(reply));

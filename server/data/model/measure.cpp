@@ -213,10 +213,14 @@ std::optional<std::vector<double>> value_at(const Volume& volume, const std::arr
 }
 
 void FieldRange::add(const Volume& volume) {
-  masked += volume.masked;
-  if (volume.masked >= static_cast<std::int64_t>(volume.samples())) return;
-  const std::array added{static_cast<double>(volume.range[0]),
-                         static_cast<double>(volume.range[1])};
+  add(StoredRange{volume.range, volume.masked}, volume.samples());
+}
+
+void FieldRange::add(const StoredRange& stored, std::size_t samples) {
+  masked += stored.masked;
+  if (stored.masked >= static_cast<std::int64_t>(samples)) return;
+  const std::array added{static_cast<double>(stored.range[0]),
+                         static_cast<double>(stored.range[1])};
   range =
       range ? std::array{std::min((*range)[0], added[0]), std::max((*range)[1], added[1])} : added;
 }

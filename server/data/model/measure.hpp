@@ -12,6 +12,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/model/dataset_info.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/model/volume.hpp"
 
 namespace windsplat::data {
@@ -72,6 +73,8 @@ struct FieldRange {
   std::int64_t masked = 0;
 
   void add(const Volume& volume);
+  // What a source has stored of a volume of so many samples.
+  void add(const StoredRange& stored, std::size_t samples);
 };
 
 // The samples with the least and the greatest value, the first of equal ones in the order of the

@@ -10,6 +10,7 @@
 #include "server/scene/defaults.hpp"
 #include "server/scene/defaults/first_step.hpp"
 #include "server/scene/defaults/opacity.hpp"
+#include "server/scene/detail.hpp"
 #include "server/scene/difference/difference.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/rates.hpp"
@@ -49,7 +50,7 @@ Result<void> complete_magnitudes(View& view, const Placed& placed,
   if (!vector.magnitude_range && named) {
     const auto range = from_first_step(
         dataset, "magnitudes", field, {},
-        [](const data::Volume& volume) { return numbers_of(default_magnitude_range(volume)); });
+        [](const DefaultSamples& of) { return numbers_of(default_magnitude_range(*of.volume)); });
     if (!range) return range.error();
     vector.magnitude_range = Range{(*range)[0], (*range)[1]};
   }
@@ -63,8 +64,9 @@ Result<void> complete_magnitudes(View& view, const Placed& placed,
     arguments.insert(arguments.end(), {range[0], range[1], spacing.length, 1.0 * spacing.stride});
     const auto least = from_first_step(
         dataset, "least magnitude", field, arguments,
-        [&](const data::Volume& volume) {
-          return std::vector{default_min_magnitude(range, spacing, volume, lattice, slice)};
+        [&](const DefaultSamples& of) {
+          return std::vector{
+              default_min_magnitude(range, spacing, *of.volume, lattice, of.slice(slice))};
         },
         &placed);
     if (!least) return least.error();
@@ -76,9 +78,9 @@ Result<void> complete_magnitudes(View& view, const Placed& placed,
 
 Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& dataset) {
   const auto range =
-      from_first_step(dataset, "range", field.name, {}, [&](const data::Volume& volume) {
-        return numbers_of(dataset.subtrahend() ? default_difference_range(volume)
-                                               : default_scalar_range(field, volume));
+      from_first_step(dataset, "range", field.name, {}, [&](const DefaultSamples& of) {
+        return numbers_of(dataset.subtrahend() ? default_difference_range(*of.volume)
+                                               : default_scalar_range(field, *of.volume));
       });
   if (!range) return range.error();
   return Range{(*range)[0], (*range)[1]};
@@ -100,8 +102,14 @@ Result<Range> first_rise_range(const View& view, const Placed& placed, data::Dat
   }
   const auto range = from_first_step(
       dataset, "rises", vector.field.name, arguments,
-      [&](const data::Volume& volume) {
-        return numbers_of(default_rise_range(vector, *factors, volume, slice));
+      [&](const DefaultSamples& of) {
+        ComponentFactors here = *factors;
+        if (auto& rates = here.rates) {
+          const auto& widths = placed.lattice.spacing;
+          rates->x = coarsen_along(rates->x, widths[1], of.halvings[1]);
+          rates->z = coarsen_along(rates->z, widths[2], of.halvings[2]);
+        }
+        return numbers_of(default_rise_range(vector, here, *of.volume, of.slice(slice)));
       },
       &placed);
   if (!range) return range.error();
@@ -116,7 +124,7 @@ Result<Range> magnitude_colors(const protocol::VectorView& vector, bool is_range
   }
   const auto top = from_first_step(
       dataset, "colour top", vector.field.name, {},
-      [](const data::Volume& volume) { return std::vector{default_color_top(volume)}; });
+      [](const DefaultSamples& of) { return std::vector{default_color_top(*of.volume)}; });
   if (!top) return top.error();
   return default_magnitude_colors(vector, top->front());
 }
@@ -134,8 +142,8 @@ Result<Range> default_color_range(const View& view, bool is_range_given, const P
       arguments.push_back(*vector.min_magnitude);
       const auto range = from_first_step(
           dataset, "heights", vector.field.name, arguments,
-          [&](const data::Volume& volume) {
-            return numbers_of(default_height_range(vector, volume, lattice));
+          [&](const DefaultSamples& of) {
+            return numbers_of(default_height_range(vector, *of.volume, of.lattice(lattice)));
           },
           &placed);
       if (!range) return range.error();
@@ -167,11 +175,11 @@ Result<void> make_transparent(protocol::ScalarView& scalar, const Range& range,
   arguments.insert(arguments.end(), range.begin(), range.end());
   const auto points = from_first_step(
       dataset, "extinction", scalar.field, arguments,
-      [&](const data::Volume& volume) {
+      [&](const DefaultSamples& of) {
         const data::FieldInfo& field = *dataset.info().find(scalar.field);
         std::vector<double> numbers;
-        for (const auto& [value, extinction] :
-             transparent_extinction(scalar_style(field), range, volume, placed.lattice)) {
+        for (const auto& [value, extinction] : transparent_extinction(
+                 scalar_style(field), range, *of.volume, of.lattice(placed.lattice))) {
           numbers.insert(numbers.end(), {value, extinction});
         }
         return numbers;
