@@ -1,0 +1,199 @@
+#!/usr/bin/env python3
+"""Stores with levels against the same data as netCDF: equal pictures where both fit into memory,
+and pictures where only levels do. Levels are computed here (stores.py), not by the program.
+
+Usage: levels.py --program=PATH [unittest arguments]
+"""
+import io
+import json
+import pathlib
+import re
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+
+from served import Daemon, taken_program
+from stores import write_netcdf, write_store
+
+PROGRAM = taken_program()
+LIMIT = 192  # MiB, of which 68 are for data
+SMALL = (37, 42, 51)  # z, y, x
+LARGE = (200, 240, 300)  # 55 MiB a scalar, 165 MiB a vector
+CHAIN = [(0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 3, 3)]
+
+
+def made(shape, steps, masked):
+    """A cloud and a whirling wind with noise."""
+    rng = np.random.default_rng(3)
+    z, y, x = np.meshgrid(*(np.linspace(-1, 1, n) for n in shape), indexing="ij", sparse=True)
+    out = {name: np.empty((steps, *shape), "f4") for name in ("cloud", "u", "v", "w")}
+    for step in range(steps):
+        noise = rng.normal(size=shape).astype("f4")
+        out["cloud"][step] = 1e-3 * np.exp(-6 * ((x - 0.2 * step)**2 + y**2 + z**2)) * (
+            1 + 0.3 * noise)
+        out["u"][step] = -9 * y + noise
+        out["v"][step] = 9 * x - noise
+        out["w"][step] = 3 * (1 - z * z) + noise * x
+        if masked:
+            hole = (np.abs(x - 0.5) < 0.2) & (np.abs(y) < 0.3) & (z > 0)
+            for values in out.values():
+                values[step][np.broadcast_to(hole, shape)] = np.nan
+    return out
+
+
+class Levels(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="windsplat-levels-")
+        folder = pathlib.Path(cls.folder.name)
+        paths = []
+        for name, uneven in (("even", False), ("uneven", True)):
+            axes = [100.0 * np.arange(n) for n in SMALL]
+            if uneven:
+                axes[0] = 40 * np.arange(SMALL[0]) + 2.5 * np.arange(SMALL[0])**1.9
+            fields = made(SMALL, 2, masked=True)
+            write_netcdf(folder / f"{name}.nc", fields, axes, 2)
+            write_store(folder / f"{name}_store.zarr", fields, axes, 2, CHAIN, 3, uneven)
+            paths += [folder / f"{name}.nc", folder / f"{name}_store.zarr"]
+        axes = [100.0 * np.arange(n) for n in LARGE]
+        fields = made(LARGE, 1, masked=False)
+        write_netcdf(folder / "large.nc", fields, axes, 1)
+        write_store(folder / "large_store.zarr", fields, axes, 1, CHAIN, 3)
+        large = [folder / "large.nc", folder / "large_store.zarr"]
+        cls.roomy = Daemon(PROGRAM, *paths, *large, "--memory-limit=1500M")
+        cls.tight = Daemon(PROGRAM, large[1], f"--memory-limit={LIMIT}M")
+        cls.refusing = Daemon(PROGRAM, large[0], f"--memory-limit={LIMIT}M")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.roomy.end()
+        cls.tight.end()
+        cls.refusing.end()
+        cls.folder.cleanup()
+
+    def picture(self, daemon, view, kind="image/png"):
+        answer = daemon.ask("POST", "/v1/frames", json.dumps(view),
+                            {"Content-Type": "application/json", "Accept": kind})
+        self.assertEqual(answer.status, 200, answer.body[:2000])
+        return answer
+
+    def level(self, answer):
+        found = re.search(r"level=(\d,\d,\d)", answer.headers["Windsplat-Frame"])
+        return found and found[1]
+
+    def assert_same_pictures(self, dataset, view):
+        plain = self.picture(self.roomy, {**view, "dataset": dataset})
+        store = self.picture(self.roomy, {**view, "dataset": f"{dataset}_store"})
+        self.assertEqual(self.level(store), self.level(plain), view)
+        self.assertEqual(store.body, plain.body, (dataset, view))
+        return self.level(store)
+
+    def test_pictures_are_those_of_the_plain_file(self):
+        levels = set()
+        for dataset in ("even", "uneven"):
+            for method in ("kernel", "slab"):
+                for height in (16, 240):
+                    for vector in ({}, {"field": None}, {"stride": 1, "opacity": 0.1}):
+                        image = {"width": height * 5 // 4, "height": height}
+                        view = {"step": 1, "method": {"name": method}, "vector": vector,
+                                "image": image}
+                        levels.add(self.assert_same_pictures(dataset, view))
+        self.assertIn(None, levels)
+        self.assertIn("1,1,1", levels)
+
+    def test_lines_of_every_stride_are_those_of_the_plain_file(self):
+        for stride in (1, 2, 3, 4, 8):
+            view = {"vector": {"stride": stride}, "image": {"width": 20, "height": 16}}
+            self.assert_same_pictures("even", view)
+            self.assert_same_pictures("uneven", view)
+
+    def test_levels_of_other_widths_are_computed(self):
+        for vertical in ("index", "linear"):
+            view = {"geometry": {"vertical": vertical}, "vector": {"field": None},
+                    "image": {"width": 10, "height": 8}}
+            self.assertEqual(self.assert_same_pictures("uneven", view), "1,1,1")
+
+    def test_regions_and_slices_are_those_of_the_plain_file(self):
+        image = {"width": 20, "height": 16}
+        for view in ({"region": {"x": [500, 4000]}},
+                     {"geometry": {"slice": {"axis": "z", "index": 9}}},
+                     {"region": {"where": [{"field": "cloud", "range": [1e-4, 1]}]}}):
+            self.assert_same_pictures("even", {**view, "image": image})
+
+    def test_default_views_and_ranges_are_those_of_the_plain_file(self):
+        for dataset in ("even", "uneven"):
+            plain, store = (self.roomy.get(f"/v1/datasets/{one}").json()
+                            for one in (dataset, f"{dataset}_store"))
+            for one in (plain, store):
+                one["defaultView"].pop("dataset")
+            self.assertEqual(store["defaultView"], plain["defaultView"])
+            for field in ("cloud", "wind"):
+                for query in ("?step=1", "?of=all", ""):
+                    one, two = (self.roomy.get(f"/v1/datasets/{d}/fields/{field}/range{query}")
+                                for d in (dataset, f"{dataset}_store"))
+                    self.assertEqual(one.status, two.status)
+                    self.assertEqual(one.body, two.body, (field, query))
+
+    def test_a_store_that_exceeds_the_memory_is_drawn_from_its_levels(self):
+        image = {"width": 320, "height": 240}
+        refused = self.refusing.post("/v1/frames", {"image": image, "dataset": "large"})
+        self.assertEqual(refused.status, 507, refused.body[:500])
+        drawn = self.picture(self.tight, {"image": image, "dataset": "large_store"})
+        self.assertIn(self.level(drawn), ("1,1,1", "2,2,2"))
+        scalars = self.roomy.get("/v1/datasets/large").json()["defaultView"]["scalars"]
+        for method in ("kernel", "slab"):
+            here = {"image": image, "method": {"name": method}, "vector": {"field": None},
+                    "scalars": scalars}
+            coarse = self.picture(self.tight, {**here, "dataset": "large_store"},
+                                  "application/x-npy")
+            self.assertIn(self.level(coarse), ("1,1,1", "2,2,2"))
+            fine = self.picture(self.roomy, {**here, "dataset": "large"}, "application/x-npy")
+            found, wanted = (np.load(io.BytesIO(one.body)).astype("f8") for one in (coarse, fine))
+            self.assertEqual(found.shape, wanted.shape)
+            self.assertLess(np.sqrt(np.mean((found - wanted)**2)), 0.01)
+            self.assertGreater(np.std(found), 0.02)
+
+    def test_what_shows_every_sample_is_refused_with_the_limit_that_would_suffice(self):
+        image = {"width": 64, "height": 48}
+        for view in ({"method": {"detail": "full"}},
+                     {"geometry": {"slice": {"axis": "z", "index": 9}}}):
+            answer = self.tight.post("/v1/frames",
+                                     {**view, "dataset": "large_store", "image": image})
+            status, detail = answer.detail()
+            self.assertEqual(status, 507, (view, detail))
+            self.assertIn("would suffice", detail)
+
+    def test_strided_lines_of_a_store_that_exceeds_the_memory_come_from_middles_of_kernels(self):
+        image = {"width": 320, "height": 240}
+        for stride in (1, 2, 4, 8):
+            view = {"dataset": "large_store", "vector": {"stride": stride}, "scalars": [],
+                    "image": image}
+            found = self.picture(self.tight, view, "application/x-npy")
+            wanted = self.picture(self.roomy, {**view, "dataset": "large"}, "application/x-npy")
+            found, wanted = (np.load(io.BytesIO(one.body)).astype("f8") for one in (found, wanted))
+            self.assertLess(np.sqrt(np.mean((found - wanted)**2)), 0.1, stride)
+
+    def test_ranges_of_a_store_that_exceeds_the_memory_are_exact(self):
+        for field in ("cloud", "wind"):
+            query = f"fields/{field}/range?of=all"
+            found = self.tight.get(f"/v1/datasets/large_store/{query}")
+            wanted = self.roomy.get(f"/v1/datasets/large/{query}")
+            self.assertEqual((found.status, found.body), (wanted.status, wanted.body))
+
+    def test_default_views_of_a_store_that_exceeds_the_memory_are_near_those_of_all_samples(self):
+        found = self.tight.get("/v1/datasets/large_store").json()
+        wanted = self.roomy.get("/v1/datasets/large").json()
+        self.assertNotIn("can be probed, but not shown", " ".join(found.get("notes", [])))
+        for one, two in zip(found["defaultView"]["scalars"], wanted["defaultView"]["scalars"]):
+            self.assertEqual(one["field"], two["field"])
+            np.testing.assert_allclose(one["color"]["range"], two["color"]["range"], rtol=0.35)
+        one, two = (of["defaultView"]["vector"] for of in (found, wanted))
+        np.testing.assert_allclose(one["magnitudeRange"], two["magnitudeRange"], rtol=0.2)
+
+
+if __name__ == "__main__":
+    unittest.main()
