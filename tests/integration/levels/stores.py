@@ -266,10 +266,10 @@ def write_store(path, fields, axes, steps, halvings, strided=0, uneven=False):
         masked = np.isnan(values).sum(axis=(1, 2, 3)).astype("u4")
         store.array(f'statistics/{one["name"]}_masked', masked, ["time"], fill=0)
     if uneven:
-        store.array("z_widths", widths[0], ["z"])
+        store.array("0/z_widths", widths[0], ["z"])
     store.end({"windsplat": {
         "store": 1, "program": "a test", "source": "a test", "contents": str(path),
         "levels": [{"path": str(n), "halvings": list(one[::-1])}
                    for n, one in enumerate(halvings)],
-        "fields": told, "widths": {"x": None, "y": None, "z": "z_widths" if uneven else None},
+        "fields": told, "widths": {"x": None, "y": None, "z": "0/z_widths" if uneven else None},
         "statistics": "statistics"}})

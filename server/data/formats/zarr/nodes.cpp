@@ -202,7 +202,8 @@ class Search {
 
   Result<void> search_stored_levels() {
     const LevelNames& names = *out_.levels;
-    if (auto done = search(names.levels[0].path + '/', {}); !done) return done;
+    const std::set<std::string> no_fields(names.widths.begin(), names.widths.end());
+    if (auto done = search(names.levels[0].path + '/', no_fields); !done) return done;
     std::vector<std::string> paths;
     for (const LevelNames::Field& field : names.fields) {
       if (!field.ranges.empty()) {

@@ -41,7 +41,7 @@ class LevelStore {
     plain_ = opened(store_.path() + "/0");
     for (std::size_t n = 1; n < levels().size(); ++n) write_level(n);
     write_statistics();
-    write_array("lev_widths", {sides[2]}, "float64", bytes_of_items(widths()), {"lev"});
+    write_array("0/lev_widths", {sides[2]}, "float64", bytes_of_items(widths()), {"lev"});
     write_root(attribute());
   }
 
@@ -63,7 +63,7 @@ class LevelStore {
            R"({"path":"2","halvings":[2,2,1]},{"path":"3","halvings":[3,2,2]}],"fields":[)"
            R"({"name":"wind","components":["u","v","w"],"levels":"drawn","strided":2},)"
            R"({"name":"cloud","components":["cloud"],"levels":"two_values"}],)"
-           R"("widths":{"x":null,"y":null,"z":"lev_widths"},"statistics":"statistics"})";
+           R"("widths":{"x":null,"y":null,"z":"0/lev_widths"},"statistics":"statistics"})";
   }
   void write_root(const std::string& attribute) const {
     store_.put("zarr.json", group(R"({"windsplat":)" + attribute + "}"));

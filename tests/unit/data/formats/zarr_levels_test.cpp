@@ -167,8 +167,8 @@ TEST(ZarrLevels, AttributesThatDoNotFitAreRefused) {
            {R"(["u","v","w"])", R"(["u","v"])", "level 0 has no field of 'u'"},
            {R"(["u","v","w"])", R"(["u","v","a/w"])", "/fields/0/components has what is not"},
            {R"("two_values")", R"("drawn")", "/fields/1/levels is not \"two_values\""},
-           {R"("lev_widths")", R"("0/lat")", "'0/lat': has the shape (13), its level (9)"},
-           {R"("lev_widths")", R"(7)", "/widths/z is not the path of an array"},
+           {R"("0/lev_widths")", R"("0/lat")", "'0/lat': has the shape (13), its level (9)"},
+           {R"("0/lev_widths")", R"(7)", "/widths/z is not the path of an array"},
            {R"("statistics":"statistics")", R"("statistics":null)",
             "'cloud': its ranges are not stored"},
            {R"("statistics":"statistics")", R"("statistics":"s")",
@@ -197,7 +197,7 @@ TEST(ZarrLevels, ArraysOfOtherShapesAndTypesAreRefused) {
                     bytes_of_items<float>({0, 1, 2, -1}), {"time", "end"});
   EXPECT_THAT(refusal(third.path()), HasSubstr("'cloud': a range is not one of numbers"));
   const LevelStore fourth;
-  fourth.write_array("lev_widths", {9}, "float64",
+  fourth.write_array("0/lev_widths", {9}, "float64",
                      bytes_of_items<double>({1, 2, 3, 0, 1, 1, 1, 1, 1}), {"lev"});
   EXPECT_THAT(refusal(fourth.path()), HasSubstr("are not positive numbers"));
 }

@@ -191,7 +191,7 @@ class LevelSource final : public FileSource {
     const std::size_t steps = info_.steps.size();
     const auto range = checked(range_path(names), {steps, 2}, {{'f', 4}});
     if (!range) return range.error();
-    const auto masked = checked(masked_path(names), {steps}, {{'u', 4}, {'u', 8}, {'i', 8}});
+    const auto masked = checked(masked_path(names), {steps}, {{'u', 4}, {'u', 8}, {'f', 8}});
     if (!masked) return masked.error();
     std::vector<float> ends(2 * steps);
     std::vector<double> counts(steps);
