@@ -141,8 +141,7 @@ class Conversion {
   Result<void> numbers_verified(const std::string& store, const std::string& input,
                                 const convert::Recorded& recorded) {
     // Full detail is a dataset by itself.
-    const std::string name =
-        input.empty() ? (std::filesystem::path(store) / "0").native() : input;
+    const std::string name = input.empty() ? (std::filesystem::path(store) / "0").native() : input;
     auto source = open_source(name, loader_bytes(), fetcher_, cancel_);
     if (!source) return source.error();
     const data::DatasetInfo info = (*source)->info();

@@ -57,15 +57,19 @@ class Listing {
       if (number_ == 0 && !widths.empty()) add(widths, {name_of(a)}, plan_.widths[a], {});
     }
     if (info_.grid.columns) {
-      add(data::cf::longitude_name, across(), of_columns(info_.grid.columns->longitude),
+      const auto [longitude, latitude] = data::cf::position_names(info_);
+      add(longitude, across(), of_columns(info_.grid.columns->longitude),
           data::cf::longitude_attributes());
-      add(data::cf::latitude_name, across(), of_columns(info_.grid.columns->latitude),
+      add(latitude, across(), of_columns(info_.grid.columns->latitude),
           data::cf::latitude_attributes());
     }
     if (info_.grid.ground) {
       const data::Ground& ground = *info_.grid.ground;
-      add(plain_name(ground.name), across(),
-          of_columns(std::vector<double>(ground.heights.begin(), ground.heights.end())),
+      std::vector<double> values(ground.heights.begin(), ground.heights.end());
+      if (ground.kind != data::GroundKind::land) {  // depths
+        for (double& height : values) height = -height;
+      }
+      add(plain_name(ground.name), across(), of_columns(values),
           data::cf::ground_attributes(ground));
     }
     return std::move(out_);
@@ -142,8 +146,7 @@ std::vector<std::string> coordinate_paths(const data::DatasetInfo& info, const P
       if (level == 0 && !widths.empty()) out.push_back(group + widths);
     }
     if (info.grid.columns) {
-      out.push_back(group + data::cf::longitude_name);
-      out.push_back(group + data::cf::latitude_name);
+      for (const std::string& name : data::cf::position_names(info)) out.push_back(group + name);
     }
     if (info.grid.ground) out.push_back(group + plain_name(info.grid.ground->name));
   }

@@ -286,8 +286,8 @@ std::optional<std::size_t> drawn_sample(const Group& group, int halvings, int st
   return static_cast<std::size_t>(sample);
 }
 
-// Copies drawn samples, group by group. Hashes are of the group's indices in the data alone. `apart`:
-// the distance in the data of the samples that `fine` has: 1, or the stride.
+// Copies drawn samples, group by group. Hashes are of the group's indices in the data alone.
+// `apart`: the distance in the data of the samples that `fine` has: 1, or the stride.
 class Drawer {
  public:
   Drawer(const Volume& fine, const Coarsening& how, const std::array<int, 3>& data_dims, int apart)

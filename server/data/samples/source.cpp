@@ -58,10 +58,11 @@ Result<Volume> SampleSource::read(std::size_t field, std::size_t step) {
   return computed(field, step, whole_box(info_.grid.dims()));
 }
 
-Result<Volume> SampleSource::read_part(std::size_t field, std::size_t step, const Box& box) {
-  if (auto fine = check_box(box); !fine) return fine.error();
-  if (!info_.fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, box);
-  return computed(field, step, box);
+Result<Volume> SampleSource::read_part(std::size_t field, std::size_t step,
+                                       const StoredPart& part) {
+  if (auto fine = check_part(field, part); !fine) return fine.error();
+  if (!info_.fields.at(field).is_read_by_boxes()) return Source::read_part(field, step, part);
+  return computed(field, step, part.box);
 }
 
 Volume SampleSource::computed(std::size_t field, std::size_t step, const Box& box) {

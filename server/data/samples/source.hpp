@@ -34,7 +34,7 @@ class SampleSource : public Source {
  public:
   [[nodiscard]] const DatasetInfo& info() const override { return info_; }
   Result<Volume> read(std::size_t field, std::size_t step) override;
-  Result<Volume> read_part(std::size_t field, std::size_t step, const Box& box) override;
+  Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override;
 
  protected:
   // `formula_version` is part of the digest: increment it whenever a formula changes.

@@ -53,8 +53,8 @@ class MadeSource : public data::Source {
     return whole(info_, field, step);
   }
   Result<data::Volume> read_part(std::size_t field, std::size_t step,
-                                 const data::Box& box) override {
-    return cut(whole(info_, field, step), box);
+                                 const data::StoredPart& part) override {
+    return cut(whole(info_, field, step), part.box);
   }
 
   // Noise, a tenth of it masked, and a corner of a few bricks.

@@ -143,7 +143,7 @@ std::array<std::string, 2> position_names(const DatasetInfo& info) {
     return std::any_of(variables.begin(), variables.end(),
                        [&](const WrittenVariable& v) { return v.name == name; });
   };
-  std::array<std::string, 2> out{longitude_name, latitude_name};
+  std::array<std::string, 2> out{"longitude", "latitude"};
   for (std::string& name : out) {
     while (is_taken(name)) name += "_of_columns";
   }

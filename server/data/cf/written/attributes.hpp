@@ -38,9 +38,8 @@ std::string axis_name(const DatasetInfo& info, std::size_t which);
 WrittenAttributes axis_attributes(const Axis& axis, std::size_t which);
 
 // Of the positions of columns (Grid::columns), variables (y, x) in degrees, and of the ground.
-// Names of the two: these, followed by "_of_columns" where an axis or a field has that name.
-inline constexpr const char* longitude_name = "longitude";
-inline constexpr const char* latitude_name = "latitude";
+// Names of the two: longitude and latitude, followed by "_of_columns" where an axis or a field has
+// that name.
 std::array<std::string, 2> position_names(const DatasetInfo& info);
 WrittenAttributes longitude_attributes();
 WrittenAttributes latitude_attributes();

@@ -253,7 +253,8 @@ class Writer {
     for (; box.first[2] < whole.count[2]; box.first[2] += box.count[2]) {
       box.count[2] = std::min(box.count[2], whole.count[2] - box.first[2]);
       // Takes the library's lock itself if it needs it.
-      auto volume = box == whole ? source_.read(field, step) : source_.read_part(field, step, box);
+      auto volume =
+          box == whole ? source_.read(field, step) : source_.read_part(field, step, {box});
       if (!volume) return volume.error();
       float* first = volume->values.data();
       std::replace_if(

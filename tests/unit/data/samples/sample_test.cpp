@@ -112,10 +112,10 @@ TEST(Samples, PartsHaveTheValuesOfTheWhole) {
   for (const std::string& name : sample_names()) {
     auto source = sample(name, {9, 8, 7});
     for (std::size_t f = 0; f < source->info().fields.size(); ++f) {
-      const auto part = source->read_part(f, 1, box);
+      const auto part = source->read_part(f, 1, {box});
       ASSERT_TRUE(part);
       EXPECT_EQ(part->values, cut(*source->read(f, 1), box).values) << name << " field " << f;
-      EXPECT_EQ(source->read_part(f, 1, {{3, 1, 6}, {4, 7, 2}}).error().kind, ErrorKind::invalid);
+      EXPECT_EQ(source->read_part(f, 1, {{{3, 1, 6}, {4, 7, 2}}}).error().kind, ErrorKind::invalid);
     }
   }
 }
@@ -124,14 +124,14 @@ TEST(Samples, PartsHaveTheValuesOfTheWhole) {
 TEST(Tornado, PartsOfAnySizeAreComputedWithoutTheWhole) {
   auto large = sample("tornado", {4096, 4096, 4096});
   ASSERT_TRUE(large->info().fields[0].is_read_by_boxes());
-  const auto corner = large->read_part(0, 0, {{4092, 4090, 4095}, {4, 6, 1}});
+  const auto corner = large->read_part(0, 0, {{{4092, 4090, 4095}, {4, 6, 1}}});
   ASSERT_TRUE(corner);
   EXPECT_EQ(corner->dims, (std::array<int, 3>{4, 6, 1}));
   // Every third of 4095 cells has the centre of one of 1365.
   auto third = sample("tornado", {1365, 1365, 1365});
   auto all = sample("tornado", {4095, 4095, 4095});
-  const auto coarse = third->read_part(0, 0, {{700, 701, 702}, {1, 1, 1}});
-  const auto fine = all->read_part(0, 0, {{2101, 2104, 2107}, {1, 1, 1}});
+  const auto coarse = third->read_part(0, 0, {{{700, 701, 702}, {1, 1, 1}}});
+  const auto fine = all->read_part(0, 0, {{{2101, 2104, 2107}, {1, 1, 1}}});
   ASSERT_TRUE(coarse && fine);
   for (const int c : {0, 1, 2}) EXPECT_FLOAT_EQ(*fine->component(c), *coarse->component(c));
 }
