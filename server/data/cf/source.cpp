@@ -52,9 +52,7 @@ class ArraySource final : public FileSource {
     auto choice = choose_grid(file_->contents(), roles_);
     if (!choice) return named(choice.error());
     choice_ = std::move(*choice);
-    if (auto fine = check_entries(); !fine) {
-      return named(fine.error());
-    }
+    if (auto fine = check_entries(); !fine) return named(fine.error());
     info_.left_out = std::move(choice_.left_out);
     info_.notes = file_->contents().notes;
     const std::size_t notes_of_file = info_.notes.size();
@@ -78,7 +76,8 @@ class ArraySource final : public FileSource {
       return named(done.error());
     }
     if (info_.fields.empty()) {
-      return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
+      return named(
+          make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB a step"));
     }
     for (std::string note :
          {absent_components_note(file_->contents(), info_.left_out, choice_.variables),
@@ -396,11 +395,17 @@ class ArraySource final : public FileSource {
   }
 
   void add_field(FieldInfo info, Plan plan) {
-    if (info_.grid.samples() * info.components.size() * sizeof(float) > volume_bytes_max) {
-      info_.left_out.push_back({info.name, "more than 16 GiB a step"});
+    if (info.kind == FieldKind::vector && follows_other_axes_) find_rotation(info, plan);
+    if (plan.derived < 0 && !plan.rotated && !plan.follows_rows) {
+      const BoxChunk stored = box_chunk(*file_, placement_, plan.variables);
+      info.box_chunk = stored.length;
+      info.box_chunk_first = stored.first;
+    }
+    const std::size_t values = info_.grid.samples() * info.components.size();
+    if (!info.is_read_by_boxes() && values * sizeof(float) > volume_bytes_max) {
+      info_.left_out.push_back({info.name, "more than 16 GiB a step, and not read by boxes"});
       return;
     }
-    if (info.kind == FieldKind::vector && follows_other_axes_) find_rotation(info, plan);
     double decoded = 0;
     double chunk = 0;
     for (const int v : plan.variables) {
@@ -409,11 +414,6 @@ class ArraySource final : public FileSource {
     }
     info.decoded_bytes = static_cast<std::uint64_t>(std::min(decoded, 0x1p62));
     info.chunk_bytes = static_cast<std::uint64_t>(std::min(chunk, 0x1p62));
-    if (plan.derived < 0 && !plan.rotated && !plan.follows_rows) {
-      const BoxChunk stored = box_chunk(*file_, placement_, plan.variables);
-      info.box_chunk = stored.length;
-      info.box_chunk_first = stored.first;
-    }
     info_.fields.push_back(std::move(info));
     plans_.push_back(std::move(plan));
   }

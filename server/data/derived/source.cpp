@@ -39,6 +39,11 @@ class DerivedSource final : public FileSource {
         info_(source_->info()),
         own_(info_.fields.size()),
         rules_(find_rules(info_)) {
+    // They are computed as a whole.
+    std::erase_if(rules_, [&](const Rule& rule) {
+      const std::size_t values = info_.grid.samples() * rule.info.components.size();
+      return values * sizeof(float) > volume_bytes_max;
+    });
     for (const Rule& rule : rules_) info_.fields.push_back(rule.info);
     source_->on_progress([this](double done) { report_progress(done_ + share_ * done); });
   }

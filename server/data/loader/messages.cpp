@@ -86,7 +86,8 @@ Grid grid_of(Reader& in) {
   for (std::size_t a = 0; a < 3; ++a) grid.axes.at(a) = axis_of(in, a == 2);
   const std::uint64_t layer =
       std::uint64_t{grid.axes[0].coordinates.size()} * grid.axes[1].coordinates.size();
-  if (layer > cf::samples_max || layer * grid.axes[2].coordinates.size() > cf::samples_max) {
+  if (layer > cf::grid_samples_max ||
+      layer * grid.axes[2].coordinates.size() > cf::grid_samples_max) {
     in.fail();
   }
   return grid;
@@ -124,9 +125,11 @@ FieldInfo field_of(Reader& in, const std::array<int, 3>& dims, std::uint64_t sam
   chunks_of(in, dims, field);
   const std::size_t count = field.components.size();
   const bool right_count = kind == 0 ? count == 1 : count == 2 || count == 3;
+  const bool is_too_large =
+      !field.is_read_by_boxes() &&
+      samples > volume_bytes_max / sizeof(float) / std::max<std::size_t>(count, 1);
   if (kind > 1 || derived > 1 || !right_count || field.component_units.size() != count ||
-      field.name.empty() ||
-      samples > cf::volume_bytes_max / sizeof(float) / std::max<std::size_t>(count, 1)) {
+      field.name.empty() || is_too_large) {
     in.fail();
   }
   return field;

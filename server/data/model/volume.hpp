@@ -21,6 +21,9 @@ struct TwoValues {
   static constexpr int high_share = 3;
 };
 
+// Of a volume that is only read as a whole.
+inline constexpr std::size_t volume_bytes_max = std::size_t{16} << 30;
+
 // One field at one step. Samples are x fastest, then y, then z; the components of a vector are
 // consecutive arrays. A masked sample is NaN (for a vector: in every component).
 struct Volume {

@@ -242,9 +242,9 @@ std::optional<Error> not_shown(const FileContents& contents, const std::vector<L
 
 Result<void> check_size(const FileContents& contents, const GridChoice& choice) {
   const double samples = samples_of(contents, choice.space);
-  if (samples > static_cast<double>(samples_max)) {
+  if (samples > static_cast<double>(grid_samples_max)) {
     return make_error(ErrorKind::bad_data,
-                      "the grid has more than " + std::to_string(samples_max) + " samples");
+                      "the grid has more than " + std::to_string(grid_samples_max) + " samples");
   }
   if (choice.time >= 0 && length_of(contents, choice.time) > 10'000'000) {
     return make_error(ErrorKind::bad_data, "there are more than 10000000 time steps");

@@ -12,9 +12,10 @@
 
 namespace windsplat::data::cf {
 
-// Limits on what is read: a grid's samples and a volume's bytes.
+// Limits on what is read: samples of a grid, of which boxes may be read, and samples of grids and
+// meshes of which they are not.
+inline constexpr std::size_t grid_samples_max = std::size_t{1} << 36;
 inline constexpr std::size_t samples_max = std::size_t{1} << 31;
-inline constexpr std::size_t volume_bytes_max = std::size_t{16} << 30;
 
 struct GridChoice {
   std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z; -1: missing dimension
@@ -30,7 +31,7 @@ std::vector<std::string> reasons_of_no_field(const FileContents& contents,
 
 // Prefers the grid of a preferred variable, then grids with three spatial dimensions, then the one
 // with the most samples over all its variables. Errors: bad_data if there is none, or if it exceeds
-// samples_max.
+// grid_samples_max.
 Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles);
 

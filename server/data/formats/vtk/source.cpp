@@ -248,7 +248,7 @@ class VtkSource final : public FileSource {
         continue;
       }
       const auto components = static_cast<std::size_t>(array.components);
-      if (info_.grid.samples() * components * sizeof(float) > cf::volume_bytes_max) {
+      if (info_.grid.samples() * components * sizeof(float) > volume_bytes_max) {
         info_.left_out.push_back({array.name, "more than 16 GiB a step"});
         continue;
       }

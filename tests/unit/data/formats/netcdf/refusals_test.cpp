@@ -107,7 +107,7 @@ TEST(NetcdfRefusals, OversizeGridsAreRefusedBeforeAllocation) {
     file.chunk(f, {1, 100, 100});
   }
   ASSERT_LT(std::filesystem::file_size(folder / "vast.nc"), 1'000'000U);
-  expect_refused(folder / "vast.nc", ErrorKind::bad_data, "more than 2147483648 samples");
+  expect_refused(folder / "vast.nc", ErrorKind::bad_data, "more than 68719476736 samples");
   {
     NetcdfMaker file(folder / "long.nc");
     const int y = file.dimension("y", 2);
