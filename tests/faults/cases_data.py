@@ -141,12 +141,16 @@ def changing(world, count):
 
 @case("more data than --memory-limit", 40, 8)
 def little_memory(world, count):
-    daemon = world.start("--memory-limit", "192M", "tornado:200x200x200", "tornado:170x170x170",
-                         SAMPLE)
+    # Boxes of a tornado can be read without the whole, which an electric field has to be.
+    daemon = world.start("--memory-limit", "192M", "efield:200x200x200", "tornado:200x200x200",
+                         "tornado:170x170x170", SAMPLE)
     listed = ask(daemon.port, "GET", "/v1/datasets").body
-    need(b"'wind' needs 91.6 MiB" in listed, "no reason for the refusal at startup")
+    need(b"'E' needs 91.6 MiB" in listed, "no reason for the refusal at startup")
     for n in range(count):
         got = picture(daemon.port, "tornado:200x200x200", azimuth=n)
+        need(got.status == 507 and b"the field needs 91.6 MiB" in got.body,
+             f"a field that can only be probed, answered by {got.status}: {got.body[:100]!r}")
+        got = picture(daemon.port, "efield:200x200x200", azimuth=n)
         need(got.status == 404 and b"could not be opened" in got.body,
              f"refused at the start, answered by {got.status}: {got.body[:100]!r}")
         got = picture(daemon.port, "tornado:170x170x170", (512, 512), azimuth=n)

@@ -68,10 +68,11 @@ bool Dataset::reads_apart(const std::string& field, std::size_t step, const std:
 bool Dataset::reads_within_limit(const std::string& field) const {
   const FieldInfo& about = *info().find(field);
   if (is_within_limit(loading_bytes(field))) return true;
+  if (!about.is_read_by_boxes()) return false;
   const std::uint64_t bytes =
       bytes_of_box(about, box_around({0, 0, 0}, about, info().grid.dims())) +
       state_->bytes_beside(reading_box_bytes(about));
-  return about.is_read_by_boxes() && bytes <= state_->budget->bytes_max();
+  return bytes <= state_->budget->bytes_max();
 }
 
 Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, std::size_t step,

@@ -155,21 +155,35 @@ std::string limit_told(const std::string& message) {
 }
 
 TEST_F(CliServe, DatasetWithoutAFittingStepIsRefusedWithTheRequiredLimit) {
-  const std::string large = "tornado:200x200x200";  // 91.6 MiB of wind, 30.5 MiB of cloud
+  const std::string large = "efield:200x200x200";  // 91.6 MiB, read as a whole
   const Outcome refused =
       run({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large});
   EXPECT_EQ(refused.code, 1);
   EXPECT_EQ(refused.out, "");
-  EXPECT_THAT(refused.err, HasSubstr("windsplat: 'wind' needs 91.6 MiB at a step; "
-                                     "--memory-limit 192M leaves 68.0 MiB for data; 'wind' and "
-                                     "'cloud' need 122.1 MiB together: --memory-limit 250M would "
-                                     "suffice\n"));
+  EXPECT_THAT(refused.err, HasSubstr("windsplat: 'E' needs 91.6 MiB at a step; --memory-limit 192M "
+                                     "leaves 68.0 MiB for data; 'E', 'energy' and 'walls' need "
+                                     "152.6 MiB together: --memory-limit 283M would suffice\n"));
   Process daemon({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large, dataset});
   const auto port = port_of(url_of(daemon));
   EXPECT_THAT(server_test::get(port, "/v1/datasets").body, HasSubstr("91.6 MiB"));
   const auto picture = server_test::get(port, "/v1/datasets/" + large + "/frame.png?width=32");
   EXPECT_EQ(picture.status, 404);
-  EXPECT_THAT(picture.body, HasSubstr("--memory-limit 250M would suffice"));
+  EXPECT_THAT(picture.body, HasSubstr("--memory-limit 283M would suffice"));
+  daemon.send(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
+TEST_F(CliServe, DatasetThatIsReadByBoxesIsProbedWithoutAFittingStep) {
+  const std::string large = "tornado:200x200x200";  // 91.6 MiB of wind, 30.5 MiB of cloud
+  Process daemon({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large});
+  const auto port = port_of(url_of(daemon));
+  EXPECT_THAT(daemon.messages(), HasSubstr("can be probed, but its default view is not shown"));
+  const auto probe = server_test::get(port, "/v1/datasets/" + large + "/probe?index=7,8,9");
+  EXPECT_EQ(probe.status, 200) << probe.body;
+  const auto picture = server_test::get(port, "/v1/datasets/" + large + "/frame.png?width=32");
+  EXPECT_EQ(picture.status, 507);
+  EXPECT_THAT(picture.body, HasSubstr("'wind' and 'cloud' need 122.1 MiB together: "
+                                      "--memory-limit 250M would suffice"));
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
 

@@ -150,6 +150,17 @@ TEST(Part, OfAFieldBeyondTheMemoryLimitIsReadWhateverItCosts) {
                         "read: the field needs 5.0 MiB"));
 }
 
+TEST(Part, OnlyFieldsThatAreReadByBoxesAreReadBeyondTheMemoryLimit) {
+  const auto log = std::make_shared<ReadLog>();
+  const Dataset small(std::make_unique<NumberedGrid>(large_dims, log, std::array{8, 8, 8}), "grid",
+                      std::uint64_t{1} << 20);
+  EXPECT_TRUE(small.reads_within_limit("f"));
+  EXPECT_FALSE(small.reads_within_limit("whole"));
+  const Dataset roomy(std::make_unique<NumberedGrid>(large_dims, log, std::array{8, 8, 8}), "grid",
+                      2 * large_bytes);
+  EXPECT_TRUE(roomy.reads_within_limit("whole"));
+}
+
 TEST(Part, IsEvictedBeforeVolumes) {
   PartFixture f(large_bytes + (std::uint64_t{1} << 20));
   ASSERT_TRUE(f.dataset.volume("f", 0));
