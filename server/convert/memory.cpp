@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/check.hpp"
+#include "server/convert/open_files.hpp"
 #include "server/convert/pencil.hpp"
 
 namespace windsplat::convert {
@@ -78,6 +79,7 @@ class Sharing {
         std::min<std::uint64_t>(options_.threads, (limit - program_bytes) / one));
     out.workers = static_cast<unsigned>(
         std::min<std::size_t>(out.workers, std::max<std::size_t>(plan_.units.size(), 1)));
+    out.workers = workers_with_files(plan_, out.workers);
     find_decoded(out);
     for (int n = 0; n < 2 * growth_max && out.decoded > 1.01; ++n) {
       Shares more = out;

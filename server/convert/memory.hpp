@@ -1,4 +1,4 @@
-// How many workers a limit permits, and how much each reads at once.
+// How many workers the limits of memory and of open files permit, and how much each reads at once.
 #pragma once
 
 #include <array>
