@@ -75,6 +75,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(interrupted ${SYSTEM_PYTHON} tests/integration/convert/interrupted.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(outputs ${SYSTEM_PYTHON} tests/integration/convert/outputs.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(levels ${SYSTEM_PYTHON} tests/integration/levels/levels.py
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi/openapi_requests.py

@@ -1,6 +1,8 @@
 // windsplat convert: writes a dataset as a Zarr store of bricks at several levels.
 #include "server/convert/convert.hpp"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -8,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -22,7 +25,9 @@
 #include "server/cli/progress.hpp"
 #include "server/cli/signals.hpp"
 #include "server/convert/verify.hpp"
+#include "server/data/files/files.hpp"
 #include "server/data/resident/budget.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/scene/detail.hpp"
 #include "server/scene/lattice.hpp"
 
@@ -85,10 +90,36 @@ Result<std::vector<std::size_t>> steps_of(const std::string& text, std::size_t s
                                               "': the last step of the dataset is " +
                                               std::to_string(steps - 1));
   }
-  for (int step = range->first; step <= *range->last; step += range->stride) {
+  for (std::int64_t step = range->first; step <= *range->last; step += range->stride) {
     out.push_back(static_cast<std::size_t>(step));
   }
   return out;
+}
+
+// Whether one of two absolute paths is the other, or a folder that has it below.
+bool is_at_or_below(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  return std::ranges::mismatch(folder, path).in1 == folder.end();
+}
+
+// The output must not replace its input, nor be a part of it.
+Result<void> check_apart(const std::string& input, const std::string& output) {
+  if (data::sized_sample(input)) return {};
+  const auto location = data::locate(input);
+  if (!location) return location.error();
+  if (location->fetched) return {};
+  const auto plain = convert::plain_path(output);
+  if (!plain) return plain.error();
+  std::error_code fault;
+  const std::filesystem::path there = std::filesystem::weakly_canonical(*plain, fault);
+  bool is_apart =
+      location->kind != data::Location::Kind::folder ||
+      (!is_at_or_below(there, location->folder) && !is_at_or_below(location->folder, there));
+  for (const auto& member : location->members) {
+    is_apart = is_apart && !is_at_or_below(member.path, there);
+  }
+  if (is_apart && !fault) return {};
+  return make_error(ErrorKind::invalid, "-o " + in_quotes(output) + " is, contains or is within " +
+                                            in_quotes(input) + ", which is read");
 }
 
 class Conversion {
@@ -185,6 +216,7 @@ class Conversion {
 
   Result<void> write() {
     const std::string& name = arguments_.names.front();
+    if (auto apart = check_apart(name, arguments_.output); !apart) return apart;
     Progress progress;
     progress.show(0, "reading");
     auto source = open_source(name, loader_bytes(), fetcher_, cancel_);

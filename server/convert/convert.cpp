@@ -35,14 +35,9 @@ bool is_there(const fs::path& path) {
 }
 
 bool is_zarr(const fs::path& path) {
-  return is_there(path / "zarr.json") || is_there(path / ".zgroup");
-}
-
-// Where the store is written, until it is complete.
-fs::path part_of_store(const fs::path& output) {
-  fs::path plain = output.lexically_normal();
-  if (!plain.has_filename()) plain = plain.parent_path();
-  return plain.native() + ".part";
+  std::error_code fault;
+  return fs::is_regular_file(path / "zarr.json", fault) ||
+         fs::is_regular_file(path / ".zgroup", fault);
 }
 
 Result<void> check_output(const fs::path& output, bool force) {
@@ -56,19 +51,14 @@ Result<void> check_output(const fs::path& output, bool force) {
                                              " exists and is not a Zarr store: it is not replaced");
 }
 
-// Begins or continues the folder of an unfinished store.
-Result<void> prepare(const fs::path& part, bool restart) {
+// The folder of an unfinished store, which is new, empty or has a journal.
+Result<void> prepare(const fs::path& part) {
   std::error_code fault;
-  const bool begun = is_there(journal_path(part));
-  if (is_there(part) && !begun && !(restart && is_zarr(part)) && !fs::is_empty(part, fault)) {
+  if (is_there(part) && !is_there(journal_path(part)) && !fs::is_empty(part, fault)) {
     return make_error(ErrorKind::conflict,
                       in_quotes(part.native()) +
                           " exists and was not left by an unfinished conversion: remove it");
   }
-  if (restart && begun) {
-    if (auto free = Journal::check_free(part); !free) return free;
-  }
-  if (restart) fs::remove_all(part, fault);
   if (!fault) fs::create_directories(part, fault);
   if (fault) return failed("cannot make", part, fault.value());
   return {};
@@ -89,26 +79,49 @@ int rename_to(const fs::path& part, const fs::path& output, bool exchanges) {
   // The file system has neither.
   const fs::path old = part.native() + ".old";
   if (exchanges && ::rename(output.c_str(), old.c_str()) != 0) return errno;
-  if (::rename(part.c_str(), output.c_str()) != 0) return errno;
+  if (::rename(part.c_str(), output.c_str()) != 0) {
+    const int failure = errno;
+    if (exchanges) ::rename(old.c_str(), output.c_str());
+    return failure;
+  }
   return exchanges && ::rename(old.c_str(), part.c_str()) != 0 ? errno : 0;
 }
 
-// Gives the store its name; the old one is removed.
-Result<void> put_in_place(const fs::path& part, const fs::path& output) {
+// Gives the store its name; the old one is removed. What has that name is looked at again, since
+// it may not be what was there when the run began.
+Result<void> put_in_place(const fs::path& part, const fs::path& output, bool force) {
   const int folder = ::open(part.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const bool synced = folder >= 0 && ::syncfs(folder) == 0;
   const int fault = errno;
   if (folder >= 0) ::close(folder);
   if (!synced) return failed("cannot sync", part, fault);
+  if (auto free = check_output(output, force); !free) {
+    return make_error(free.error().kind, free.error().message + "; the new store is complete in " +
+                                             in_quotes(part.native()) +
+                                             ", and the same command renames it");
+  }
   const bool replaces = is_there(output);
   if (const int failure = rename_to(part, output, replaces); failure != 0) {
     return failed("cannot rename the store to", output, failure);
   }
-  clean(output);
   std::error_code ignored;
   if (replaces) fs::remove_all(part, ignored);
+  clean(output);
   const fs::path parent = output.has_parent_path() ? output.parent_path() : fs::path(".");
   return sync_folder(parent);
+}
+
+// Whether a run was ended after it had renamed the store, which is complete then: ends its work.
+Result<bool> is_renamed(const fs::path& output, const fs::path& part, const Plan& plan,
+                        bool force) {
+  if (!is_there(journal_path(output)) || !is_zarr(output)) return false;
+  if (auto free = Journal::check_free(output); !free) return free.error();
+  if (!Journal::open(output, plan, false)) return false;  // of another plan
+  std::error_code ignored;
+  const bool has_replaced = force && is_zarr(part) && !is_there(journal_path(part));
+  if (has_replaced) fs::remove_all(part, ignored);
+  clean(output);
+  return true;
 }
 
 std::string times_text(double times) {
@@ -119,26 +132,38 @@ std::string times_text(double times) {
 
 }  // namespace
 
+Result<fs::path> plain_path(const fs::path& folder) {
+  std::string text = folder.native();
+  while (text.size() > 1 && text.back() == '/') text.pop_back();
+  const fs::path out(text);
+  const fs::path name = out.filename();
+  if (!name.empty() && name != "." && name != "..") return out;
+  return make_error(ErrorKind::invalid,
+                    in_quotes(folder.native()) + " ends in no name of a folder");
+}
+
 Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Coarsening>& chain,
-                       const Options& options, const Open& open, const fs::path& output,
+                       const Options& options, const Open& open, const fs::path& folder,
                        const CancelToken& cancel, const ShowDone& progress) {
   constexpr double decoded_often = 4;
+  const auto plain = plain_path(folder);
+  if (!plain) return plain.error();
+  const fs::path& output = *plain;
+  const fs::path part = output.native() + ".part";
   auto plan = make_plan(info, chain, options);
   if (!plan) return plan.error();
   const auto shares = share_memory(info, *plan, options);
   if (!shares) return shares.error();
   Report report;
-  if (!options.force && is_there(journal_path(output))) {
-    // A run was ended after it had renamed the store.
-    if (auto same = Journal::open(output, *plan); !same) return same.error();
-    clean(output);
+  const auto renamed = is_renamed(output, part, *plan, options.force);
+  if (!renamed) return renamed.error();
+  if (*renamed) {
     report.units_kept = plan->units.size();
     return report;
   }
   if (auto free = check_output(output, options.force); !free) return free.error();
-  const fs::path part = part_of_store(output);
-  if (auto done = prepare(part, options.restart); !done) return done.error();
-  auto journal = Journal::open(part, *plan);
+  if (auto done = prepare(part); !done) return done.error();
+  auto journal = Journal::open(part, *plan, options.restart);
   if (!journal) return journal.error();
   if (::mkdir((part / ".coarse").c_str(), 0777) != 0 && errno != EEXIST) {
     return failed("cannot make a folder in", part, errno);
@@ -173,9 +198,7 @@ Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Co
   const auto bytes = finish(info, *plan, part, (*journal)->done(), cancel);
   if (!bytes) return bytes.error();
   report.written_bytes = *bytes;
-  fs::path target = part;
-  target.replace_extension();  // without ".part"
-  if (auto done = put_in_place(part, target); !done) return done.error();
+  if (auto done = put_in_place(part, output, options.force); !done) return done.error();
   return report;
 }
 

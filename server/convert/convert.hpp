@@ -45,6 +45,9 @@ struct Report {
 // The part that is done, 0 to 1; from any thread.
 using ShowDone = std::function<void(double done)>;
 
+// Without '/' at the end. Errors: invalid, if it does not end in a name.
+Result<std::filesystem::path> plain_path(const std::filesystem::path& folder);
+
 // Writes OUTPUT.part and renames it once it is complete. What a run leaves is continued by the next
 // with equal input and options, to the same bytes. `chain`: the levels, finest first: of full
 // detail and of coarser ones, with the widths of the cells along every axis that is halved. Errors:
@@ -53,7 +56,7 @@ using ShowDone = std::function<void(double done)>;
 // those of reading and writing.
 Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Coarsening>& chain,
                        const Options& options, const Open& open,
-                       const std::filesystem::path& output, const CancelToken& cancel,
+                       const std::filesystem::path& folder, const CancelToken& cancel,
                        const ShowDone& progress);
 
 }  // namespace windsplat::convert

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,7 +14,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 #include "server/base/disk_error.hpp"
 #include "server/data/formats/zarr/crc32c.hpp"
@@ -96,8 +99,12 @@ std::string difference(const OrderedJson& begun, const OrderedJson& now) {
 
 fs::path journal_path(const fs::path& store) { return store / ".journal"; }
 
-Result<std::unique_ptr<Journal>> Journal::open(const fs::path& store, const Plan& plan) {
+Result<std::unique_ptr<Journal>> Journal::open(const fs::path& store, const Plan& plan, bool anew) {
   std::unique_ptr<Journal> out(new Journal());
+  if (auto held = out->hold(store); !held) return held.error();
+  if (anew) {
+    if (auto done = out->discard(store); !done) return done.error();
+  }
   if (auto done = out->load(store, plan); !done) return done.error();
   return out;
 }
@@ -112,15 +119,38 @@ Result<void> Journal::hold(const fs::path& store) {
   path_ = journal_path(store);
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor_ < 0) return disk_error(errno, "cannot open " + in_quotes(path_.native()));
-  if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
+  // The run that held it may have renamed the store and removed the file before it was locked.
+  struct stat held {};
+  struct stat named {};
+  const bool is_held = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 &&
+                       ::fstat(descriptor_, &held) == 0 && ::stat(path_.c_str(), &named) == 0 &&
+                       held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+  if (!is_held) {
     return make_error(ErrorKind::conflict,
                       in_quotes(store.native()) + " is being written by another run");
   }
   return {};
 }
 
+// The journal is held all the while, and stays.
+Result<void> Journal::discard(const fs::path& store) {
+  if (::ftruncate(descriptor_, 0) != 0) {
+    return disk_error(errno, "cannot shorten " + in_quotes(path_.native()));
+  }
+  std::error_code fault;
+  std::vector<fs::path> others;
+  for (auto at = fs::directory_iterator(store, fault); !fault && at != fs::directory_iterator();
+       at.increment(fault)) {
+    if (at->path() != path_) others.push_back(at->path());
+  }
+  for (const fs::path& path : others) {
+    if (!fault) fs::remove_all(path, fault);
+  }
+  if (fault) return disk_error(fault.value(), "cannot empty " + in_quotes(store.native()));
+  return {};
+}
+
 Result<void> Journal::load(const fs::path& store, const Plan& plan) {
-  if (auto held = hold(store); !held) return held;
   std::ifstream file(path_, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(file)), {});
   std::size_t whole = 0;  // bytes of whole lines

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -19,11 +20,11 @@ namespace windsplat::convert {
 // Thread-safe.
 class Journal {
  public:
-  // Opens that of a store, or begins one. Units whose files are absent or have another size are not
-  // taken as done. Errors: conflict (another run holds it; it is of another plan: the message names
-  // the difference), internal, out_of_memory.
-  static Result<std::unique_ptr<Journal>> open(const std::filesystem::path& store,
-                                               const Plan& plan);
+  // Opens that of a store, or begins one; `anew`: discards what there is. Units whose files are
+  // absent or have another size are not taken as done. Errors: conflict (another run holds it; it
+  // is of another plan: the message names the difference), internal, out_of_memory.
+  static Result<std::unique_ptr<Journal>> open(const std::filesystem::path& store, const Plan& plan,
+                                               bool anew);
   // Errors: conflict, while another run holds that of a store.
   static Result<void> check_free(const std::filesystem::path& store);
   ~Journal();
@@ -38,6 +39,7 @@ class Journal {
  private:
   Journal() = default;
   Result<void> hold(const std::filesystem::path& store);
+  Result<void> discard(const std::filesystem::path& store);
   Result<void> load(const std::filesystem::path& store, const Plan& plan);
   Result<void> append(const data::zarr::OrderedJson& line);
 

@@ -1,6 +1,10 @@
 #include "server/convert/verify.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -10,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/disk_error.hpp"
 #include "server/convert/checksums.hpp"
 #include "server/convert/finish.hpp"
 #include "server/convert/memory.hpp"
@@ -109,14 +114,10 @@ class Anew {
  public:
   Anew(const data::DatasetInfo& info, const std::vector<data::Coarsening>& chain,
        const Options& options, const Open& open, const fs::path& store)
-      : info_(info), chain_(chain), options_(options), open_(open), store_(store) {
-    fs::path plain = store.lexically_normal();
-    if (!plain.has_filename()) plain = plain.parent_path();
-    folder_ = plain.native() + ".verify";
-  }
+      : info_(info), chain_(chain), options_(options), open_(open), store_(store) {}
   ~Anew() {
     std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
   }
   Anew(const Anew&) = delete;
   Anew& operator=(const Anew&) = delete;
@@ -129,12 +130,7 @@ class Anew {
     if (!plan) return plan.error();
     const auto shares = share_memory(info_, *plan, options_);
     if (!shares) return shares.error();
-    std::error_code fault;
-    fs::remove_all(folder_, fault);
-    if (fs::create_directories(folder_ / ".coarse", fault); fault) {
-      return make_error(ErrorKind::internal,
-                        "cannot make " + in_quotes(folder_.native()) + ": " + fault.message());
-    }
+    if (auto made = make_folder(); !made) return made;
     std::map<std::size_t, UnitFiles> units;
     std::mutex mutex;
     Task task;
@@ -156,6 +152,19 @@ class Anew {
   }
 
  private:
+  // Of this run alone, beside the store.
+  Result<void> make_folder() {
+    const auto plain = plain_path(store_);
+    if (!plain) return plain.error();
+    std::string name = plain->native() + ".verify.XXXXXX";
+    const bool made = ::mkdtemp(name.data()) != nullptr;
+    if (made) folder_ = name;
+    if (!made || ::mkdir((folder_ / ".coarse").c_str(), 0777) != 0) {
+      return disk_error(errno, "cannot make the folder " + in_quotes(name));
+    }
+    return {};
+  }
+
   Result<void> check(const std::string& path, const Checksum& sum) const {
     const auto found = expected_.find(path);
     if (found != expected_.end() && found->second == sum) return {};
@@ -185,7 +194,7 @@ class Anew {
   const Options& options_;
   const Open& open_;
   const fs::path& store_;
-  fs::path folder_;
+  fs::path folder_;  // empty: not made
   Checksums expected_;
 };
 

@@ -32,7 +32,7 @@ std::string read(const fs::path& path) {
 
 // Three units whose files exist.
 void add_units(const fs::path& store, const Plan& plan) {
-  auto journal = Journal::open(store, plan);
+  auto journal = Journal::open(store, plan, false);
   ASSERT_TRUE(journal) << journal.error().message;
   for (const std::size_t unit : {4U, 0U, 2U}) {
     const std::string path = "0/q/c/" + std::to_string(unit);
@@ -43,7 +43,7 @@ void add_units(const fs::path& store, const Plan& plan) {
 }
 
 std::vector<std::size_t> done_in(const fs::path& store, const Plan& plan) {
-  auto journal = Journal::open(store, plan);
+  auto journal = Journal::open(store, plan, false);
   EXPECT_TRUE(journal) << journal.error().message;
   std::vector<std::size_t> out;
   if (journal) {
@@ -56,7 +56,7 @@ TEST(ConvertJournal, UnitsAreThereAgain) {
   const test::Folder folder;
   const Plan plan = plan_of();
   add_units(folder.path(), plan);
-  auto journal = Journal::open(folder.path(), plan);
+  auto journal = Journal::open(folder.path(), plan, false);
   ASSERT_TRUE(journal);
   const auto done = (*journal)->done();
   ASSERT_EQ(done.size(), 3U);
@@ -72,7 +72,7 @@ TEST(ConvertJournal, ATornLastLineIsDroppedAndLaterOnesAreAppendedAfterTheRest) 
   for (const std::size_t lost : {1U, 2U, 20U}) {
     write(journal_path(folder.path()), text.substr(0, text.size() - lost));
     EXPECT_EQ(done_in(folder.path(), plan), (std::vector<std::size_t>{0, 4}));
-    auto journal = Journal::open(folder.path(), plan);
+    auto journal = Journal::open(folder.path(), plan, false);
     ASSERT_TRUE((*journal)->add(2, {{{"0/q/c/2", 10, 77}}, 4}));
     journal->reset();
     EXPECT_EQ(read(journal_path(folder.path())), text);
@@ -101,7 +101,7 @@ TEST(ConvertJournal, UnitsWithoutTheirFilesAreNotDone) {
 TEST(ConvertJournal, OneOfAnotherPlanIsRefusedWithTheDifference) {
   const test::Folder folder;
   add_units(folder.path(), plan_of());
-  const auto other = Journal::open(folder.path(), plan_of("zstd:3"));
+  const auto other = Journal::open(folder.path(), plan_of("zstd:3"), false);
   ASSERT_FALSE(other);
   EXPECT_EQ(other.error().kind, ErrorKind::conflict);
   EXPECT_NE(other.error().message.find("(compression: \"lz4\", now \"zstd:3\")"), std::string::npos)
@@ -112,16 +112,16 @@ TEST(ConvertJournal, OneOfAnotherPlanIsRefusedWithTheDifference) {
 TEST(ConvertJournal, TwoRunsDoNotWriteOneStore) {
   const test::Folder folder;
   const Plan plan = plan_of();
-  const auto first = Journal::open(folder.path(), plan);
+  const auto first = Journal::open(folder.path(), plan, false);
   ASSERT_TRUE(first);
-  const auto second = Journal::open(folder.path(), plan);
+  const auto second = Journal::open(folder.path(), plan, false);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().kind, ErrorKind::conflict);
 }
 
 TEST(ConvertJournal, AFullDiskIsAnError) {
   const test::Folder folder;
-  const auto journal = Journal::open(folder.path(), plan_of());
+  const auto journal = Journal::open(folder.path(), plan_of(), false);
   ASSERT_TRUE(journal);
   const test::FullDisk full(fs::file_size(journal_path(folder.path())) + 9);
   const auto added = (*journal)->add(0, {{{"0/q/c/0", 10, 77}}, 4});
