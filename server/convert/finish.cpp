@@ -100,7 +100,7 @@ class Finisher {
   // The levels that units do not make.
   Result<void> write_levels(std::size_t f, std::size_t step) {
     for (const Product& made : plan_.fields[f].products) {
-      const Level& level = plan_.levels[made.level];
+      const Level& level = plan_.level_of(made);
       if (level.by_unit) continue;
       const Three regions = over(level.dims, level.region);
       for (std::size_t n = 0; n < made.arrays.size(); ++n) {

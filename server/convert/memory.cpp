@@ -67,6 +67,7 @@ class Sharing {
   Sharing(const data::DatasetInfo& info, const Plan& plan, const Options& options)
       : info_(info), plan_(plan), options_(options) {
     for (const Level& level : plan.levels) open_.push_back(open_samples(plan, level));
+    for (const Level& level : plan.middles) open_middles_.push_back(open_samples(plan, level));
   }
 
   Result<Shares> share() {
@@ -134,12 +135,13 @@ class Sharing {
     std::uint64_t reduced = 0;  // one at a time
     for (const Product& made : field.products) {
       if (made.level == 0) continue;
-      const Level& level = plan_.levels[made.level];
+      const Level& level = plan_.level_of(made);
+      const auto& open = made.as == Reduced::strided ? open_middles_ : open_;
       Three groups{};
       for (std::size_t a = 0; a < 3; ++a) groups[a] = over(pencil[a], 1 << level.how.halvings[a]);
       reduced = std::max(reduced, floats(product(groups) * made.arrays.size()));
       const std::size_t samples =
-          level.by_unit ? open_[made.level] : product(over(plan_.unit, group_of(level)));
+          level.by_unit ? open[made.level] : product(over(plan_.unit, group_of(level)));
       bytes += floats(samples * made.arrays.size());
     }
     const Three bricks = over(plan_.unit, plan_.levels[0].brick);
@@ -187,7 +189,7 @@ class Sharing {
   const data::DatasetInfo& info_;
   const Plan& plan_;
   const Options& options_;
-  std::vector<std::size_t> open_;  // samples in open bricks, by level
+  std::vector<std::size_t> open_, open_middles_;  // samples in open bricks, by level
 };
 
 }  // namespace

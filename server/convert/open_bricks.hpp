@@ -11,7 +11,7 @@
 
 namespace windsplat::convert {
 
-// The region of a unit at a level, all arrays of a field in it.
+// The region of a unit at a level, the arrays of a product in it.
 class OpenBricks {
  public:
   // `box`: of the unit at this level; `writers`: of the arrays.

@@ -11,7 +11,7 @@ namespace windsplat::convert {
 
 data::Volume reduce(const Plan& plan, const Product& product, const data::Volume& pencil,
                     const data::Box& box) {
-  const Level& level = plan.levels[product.level];
+  const Level& level = plan.level_of(product);
   data::Coarsening how = level.how;
   how.first = box.first;
   how.data_dims = plan.dims;

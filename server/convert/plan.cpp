@@ -9,6 +9,7 @@
 
 #include "server/convert/coordinates.hpp"
 #include "server/data/cf/written/attributes.hpp"
+#include "server/data/model/stored.hpp"
 
 namespace windsplat::convert {
 
@@ -21,7 +22,6 @@ constexpr int brick_length = 64;
 constexpr int whole_length_max = 128;  // axes up to this length are not divided
 constexpr std::size_t brick_samples_max = std::size_t{1} << 17;  // of bricks that are enlarged
 constexpr int unit_bricks = 8;                                   // along divided axes
-constexpr int strided_levels_max = 4;
 
 Error invalid(const std::string& what) { return make_error(ErrorKind::invalid, what); }
 
@@ -126,6 +126,11 @@ class Planner {
     plan_.pencil[0] = plan_.unit[0];
     plan_.units_along = over(plan_.dims, plan_.unit);
     for (const data::Coarsening& how : chain_) plan_.levels.push_back(level_of(how, brick));
+    for (int n = 0; n <= data::strided_levels_max && n < static_cast<int>(chain_.size()); ++n) {
+      data::Coarsening how;
+      how.halvings = {n, n, n};
+      plan_.middles.push_back(level_of(how, brick));
+    }
     for (std::size_t a = 0; a < 3; ++a) keep_widths(a);
   }
 
@@ -193,9 +198,10 @@ class Planner {
     return plan_.arrays.size() - 1;
   }
 
-  // An array of a field at a level.
-  std::size_t add_level_array(std::size_t level, const std::string& name, OrderedJson attributes) {
-    const Level& at = plan_.levels[level];
+  // An array of a field at a level. In its group a dimension has one length, so that those of
+  // middles of kernels have other names where theirs is another.
+  std::size_t add_level_array(std::size_t level, const Level& at, const std::string& name,
+                              OrderedJson attributes) {
     const auto with_time = [](std::size_t steps, const Three& a) {
       return std::vector<std::size_t>{steps, static_cast<std::size_t>(a[2]),
                                       static_cast<std::size_t>(a[1]),
@@ -208,6 +214,9 @@ class Planner {
     array.chunk = with_time(1, at.brick);
     array.dtype = {'f', 4};
     array.dimensions = dimension_names(info_);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (at.dims[a] != plan_.levels[level].dims[a]) array.dimensions[3 - a] += "_strided";
+    }
     array.attributes = std::move(attributes);
     return add_array(std::move(array));
   }
@@ -223,14 +232,14 @@ class Planner {
       const auto add = [&](Reduced as, const std::string& ending, const auto& attributes) {
         Product made{as, level, {}};
         for (const auto& variable : variables) {
-          made.arrays.push_back(
-              add_level_array(level, variable.name + ending, attributes(variable)));
+          made.arrays.push_back(add_level_array(level, plan_.level_of(made), variable.name + ending,
+                                                attributes(variable)));
         }
         field.products.push_back(std::move(made));
       };
       const auto whole = [&](const auto& v) { return json_of(placed_attributes(info_, v)); };
       const auto values = [&](const auto& v) {
-        return json_of(placed_attributes(info_, v), of_values);
+        return json_of(placed_attributes(info_, v), {"units"});
       };
       if (level == 0) {
         add(Reduced::samples, "", whole);
@@ -240,14 +249,14 @@ class Planner {
         for (const char* const ending : {"_low", "_high", "_low_share", "_high_share"}) {
           const bool share = std::string(ending).ends_with("share");
           made.arrays.push_back(
-              add_level_array(level, variables[0].name + ending,
+              add_level_array(level, plan_.levels[level], variables[0].name + ending,
                               json_of(placed_attributes(info_, variables[0]),
                                       share ? std::set<std::string>{"coordinates"} : of_values)));
         }
         field.products.push_back(std::move(made));
       } else {
         add(Reduced::drawn, "", whole);
-        if (is_strided(level)) {
+        if (level < plan_.middles.size()) {
           add(Reduced::strided, "_strided", values);
           field.strided = static_cast<int>(level);
         }
@@ -255,16 +264,11 @@ class Planner {
         field.products.push_back(
             {Reduced::mean_magnitude,
              level,
-             {add_level_array(level, field.mean, json_of(mean_attributes(info_, variables[0])))}});
+             {add_level_array(level, plan_.levels[level], field.mean,
+                              json_of(mean_attributes(info_, variables[0])))}});
       }
     }
     add_statistics(field);
-  }
-
-  // Levels that halve every axis equally, and so do those before.
-  [[nodiscard]] bool is_strided(std::size_t level) const {
-    const int h = static_cast<int>(level);
-    return h <= strided_levels_max && plan_.levels[level].how.halvings == Three{h, h, h};
   }
 
   void add_statistics(PlannedField& field) {

@@ -59,7 +59,7 @@ struct PlannedField {
   int components = 1;
   std::vector<Product> products;  // by level; the first are the samples
   std::string mean;               // name of the mean magnitude; empty: of a scalar
-  int strided = 0;                // levels with strided samples, from level 1 on
+  int strided = 0;                // levels with middles of kernels, from level 1 on
   // Of bricks of level 0 and of steps, in Plan::arrays.
   std::size_t low = 0, high = 0, masked = 0, histogram = 0, range = 0, masked_of_step = 0;
 };
@@ -76,6 +76,7 @@ struct Plan {
   Three dims{1, 1, 1};
   std::vector<std::size_t> steps;  // of the input
   std::vector<Level> levels;
+  std::vector<Level> middles;  // of kernels of stride 2^n along all axes, beside level n; from 1 on
   std::vector<PlannedField> fields;
   std::vector<data::zarr::WrittenArray> arrays;  // of fields and statistics
   std::array<std::vector<double>, 3> widths;     // that weight two values and means; empty: equal
@@ -91,6 +92,10 @@ struct Plan {
   // What equal stores have in common, by name: of a journal.
   data::zarr::OrderedJson identity;
 
+  // That of the samples of a product.
+  [[nodiscard]] const Level& level_of(const Product& made) const {
+    return made.as == Reduced::strided ? middles[made.level] : levels[made.level];
+  }
   [[nodiscard]] data::Box box_of(const Unit& unit) const;
   // The same box at a level.
   [[nodiscard]] data::Box box_at(const data::Box& box, const Level& level) const;

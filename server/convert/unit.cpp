@@ -33,7 +33,7 @@ Kept::Kept(const Plan& plan, const PlannedField& field, const data::Box& unit)
     : bricks_(over(unit.count, plan.levels[0].brick)) {
   bytes_ = product(bricks_) * bytes_of_brick();
   for (const Product& made : field.products) {
-    const Level& level = plan.levels[made.level];
+    const Level& level = plan.level_of(made);
     if (level.by_unit) continue;
     const data::Box box = plan.box_at(unit, level);
     for (const std::size_t array : made.arrays) {
@@ -66,40 +66,33 @@ class UnitMaker {
         statistics_(product(kept_.bricks())),
         coarse_((kept_.bytes() - product(kept_.bricks()) * Kept::bytes_of_brick()) /
                 sizeof(float)) {
-    for (const Product& made : field_.products) {
-      const Level& level = plan_.levels[made.level];
+    open_.resize(field_.products.size());
+    for (std::size_t p = 0; p < open_.size(); ++p) {
+      const Product& made = field_.products[p];
+      const Level& level = plan_.level_of(made);
       if (!level.by_unit) continue;
       const data::Box at = plan_.box_at(box_, level);
-      for (const std::size_t array : made.arrays) {
-        writers_.emplace(array, ShardWriter(store_, plan_.arrays[array],
-                                            region_place(level, unit_.step, at.first)));
-      }
-    }
-    open_.resize(plan_.levels.size());
-    for (std::size_t level = 1; level < plan_.levels.size(); ++level) {
-      if (!plan_.levels[level].by_unit) continue;
       std::vector<ShardWriter*> writers;
-      for (const Product& made : field_.products) {
-        if (made.level != level) continue;
-        for (const std::size_t array : made.arrays) writers.push_back(&writers_.at(array));
+      for (const std::size_t array : made.arrays) {
+        ShardWriter writer(store_, plan_.arrays[array], region_place(level, unit_.step, at.first));
+        writers.push_back(&writers_.emplace(array, std::move(writer)).first->second);
       }
-      open_[level].emplace(plan_.levels[level], plan_.box_at(box_, plan_.levels[level]),
-                           std::move(writers));
+      if (made.level > 0) open_[p].emplace(level, at, std::move(writers));
     }
   }
 
   Result<void> add(const data::Volume& pencil, const data::Box& box) {
     if (auto done = add_bricks(pencil, box); !done) return done;
-    std::vector<std::size_t> arrays(plan_.levels.size(), 0);  // of a level, so far
-    for (const Product& made : field_.products) {
+    for (std::size_t p = 0; p < open_.size(); ++p) {
+      const Product& made = field_.products[p];
       if (made.level == 0) continue;
-      const Level& level = plan_.levels[made.level];
+      const Level& level = plan_.level_of(made);
       const data::Volume reduced = reduce(plan_, made, pencil, box);
       const data::Box at = plan_.box_at(box, level);
       for (std::size_t n = 0; n < made.arrays.size(); ++n) {
         const float* const values = reduced.component(static_cast<int>(n));
         if (level.by_unit) {
-          auto done = open_[made.level]->put(arrays[made.level]++, at, values);
+          auto done = open_[p]->put(n, at, values);
           if (!done) return done;
         } else {
           keep(made.arrays[n], at, values);
@@ -215,7 +208,7 @@ class UnitMaker {
   Statistics statistics_;
   std::vector<float> coarse_;
   std::map<std::size_t, ShardWriter> writers_;   // by array
-  std::vector<std::optional<OpenBricks>> open_;  // by level
+  std::vector<std::optional<OpenBricks>> open_;  // by product
   std::vector<float> padded_;
   data::Volume brick_;
 };

@@ -83,7 +83,12 @@ TEST(ConvertPlan, ArraysHaveTheShapesOfTheirLevels) {
   EXPECT_EQ(arrays["1/q_low_share"]->shape, (Shape{3, 100, 450, 500}));
   EXPECT_EQ(arrays["1/q_low_share"]->shard, (Shape{1, 100, 256, 256}));
   EXPECT_EQ(arrays["1/wind_magnitude"]->shape, (Shape{3, 100, 450, 500}));
-  EXPECT_FALSE(arrays.contains("1/u_strided"));  // z is not halved
+  // Of kernels of stride 2 along all axes, also along z, which is not halved.
+  EXPECT_EQ(arrays["1/u_strided"]->shape, (Shape{3, 50, 450, 500}));
+  EXPECT_EQ(arrays["1/u_strided"]->shard, (Shape{1, 50, 256, 256}));
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(arrays["1/u_strided"]->dimensions, (Names{"time", "z_strided", "y", "x"}));
+  EXPECT_EQ(arrays["1/u"]->dimensions, (Names{"time", "z", "y", "x"}));
   EXPECT_EQ(arrays["statistics/0/wind_histogram"]->shape, (Shape{3, 1, 15, 16, 32}));
 }
 
