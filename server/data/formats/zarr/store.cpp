@@ -27,6 +27,12 @@ Result<std::unique_ptr<Store>> Store::open(std::shared_ptr<Files> files,
     others.version = contents->version;
     others.name = contents->name;
     others.arrays = std::move(contents->level_arrays);
+    for (const Array& array : contents->arrays) {
+      out->finest.emplace(array.name, array);
+      if (!array.is_coordinate()) continue;
+      others.arrays.push_back(array);
+      others.arrays.back().name = array.path.substr(0, array.path.size() - 1);
+    }
     for (const Array& array : others.arrays) {
       out->indices.emplace(array.name, static_cast<int>(out->metadata.size()));
       out->metadata.push_back(array.metadata);

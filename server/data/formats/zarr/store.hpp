@@ -94,9 +94,10 @@ class Store final : public cf::ArrayFile {
   mutable Recent<OpenShard> shards_;
 };
 
-// The arrays that the attribute of a store with levels names.
+// The arrays that the attribute of a store with levels names, and the coordinates of level 0.
 struct LevelStore {
   LevelNames names;
+  std::map<std::string, Array> finest;  // of level 0, by name
   std::vector<ArrayMetadata> metadata;  // by the index of an array in `arrays`
   std::map<std::string, int> indices;   // by path
   std::unique_ptr<const Store> arrays;

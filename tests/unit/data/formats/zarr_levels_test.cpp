@@ -178,6 +178,42 @@ TEST(ZarrLevels, AttributesThatDoNotFitAreRefused) {
   }
 }
 
+TEST(ZarrLevels, OfAFieldThatIsNamedTwiceAreRefused) {
+  const LevelStore store;
+  const std::string wind = R"({"name":"wind","components":["u","v","w"],"levels":"drawn"},)";
+  const std::string twice =
+      replaced(LevelStore::attribute(), R"({"name":"wind")", wind + R"({"name":"wind")");
+  // Without ranges, which would be too many.
+  const std::string cloud = R"({"name":"cloud","components":["cloud"],"levels":"two_values"})";
+  const std::string bare = replaced(
+      replaced(twice, R"("statistics":"statistics")", R"("statistics":null)"), "," + cloud, "");
+  for (const std::string& attribute : {twice, bare}) {
+    store.write_root(attribute);
+    EXPECT_THAT(refusal(store.path()),
+                HasSubstr("the attribute 'windsplat': /fields has 'wind' twice"));
+  }
+}
+
+// The other levels are neither turned nor converted.
+TEST(ZarrLevels, OfALevelZeroThatIsNotReadAsItIsStoredAreRefused) {
+  const LevelStore store;
+  std::vector<double> lat(LevelStore::sides[1]);
+  for (std::size_t n = 0; n < lat.size(); ++n) lat[n] = 46 - 0.5 * static_cast<double>(n);
+  store.write_array("0/lat", {lat.size()}, "float64", bytes_of_items(lat), {"lat"},
+                    R"({"units":"degrees_north"})");
+  EXPECT_THAT(refusal(store.path()), HasSubstr("'0/lat': its order is not that of a dataset"));
+  const std::vector<std::size_t> shape{2, 9, 13, 21};
+  const LevelStore packed;
+  packed.write_array("0/cloud", shape, "float32", "", {"time", "lev", "lat", "lon"},
+                     R"({"units":"kg kg-1","scale_factor":2})");
+  EXPECT_THAT(refusal(packed.path()),
+              HasSubstr("'0/cloud': has the attribute scale_factor, its levels have not"));
+  const LevelStore turned;
+  turned.write_array("0/v", {2, 9, 21, 13}, "float32", "", {"time", "lev", "lon", "lat"},
+                     R"({"units":"m s-1","windsplat_vector":"wind 1"})");
+  EXPECT_THAT(refusal(turned.path()), HasSubstr("'0/v': its dimensions are not those of levels"));
+}
+
 TEST(ZarrLevels, ArraysOfOtherShapesAndTypesAreRefused) {
   const LevelStore store;
   const std::vector<std::string> names{"time", "lev", "lat", "lon"};

@@ -37,6 +37,7 @@ class LevelSource final : public FileSource {
     for (const LevelNames::Level& level : store_->names.levels) {
       stored.levels.push_back(level.halvings);
     }
+    if (auto done = check_directions(); !done) return done;
     if (auto done = read_widths(stored); !done) return done;
     if (const std::string fault = fault_of(stored, info_); !fault.empty()) return wrong("", fault);
     for (const LevelNames::Field& names : store_->names.fields) {
@@ -133,6 +134,48 @@ class LevelSource final : public FileSource {
     return index;
   }
 
+  [[nodiscard]] std::string in_finest(const std::string& name) const {
+    return store_->names.levels.front().path + '/' + name;
+  }
+
+  // Level 0 is turned when it is read, the other levels are not.
+  Result<void> check_directions() const {
+    for (const Axis& axis : info_.grid.axes) {
+      const std::size_t samples = axis.coordinates.size();
+      const std::string path = in_finest(axis.name);
+      const auto found = store_->indices.find(path);
+      if (found == store_->indices.end() || samples < 2) continue;
+      std::vector<double> values(samples);
+      auto done = store_->arrays->read(found->second, {0}, {samples}, values.data());
+      if (!done) return done;
+      const auto ascends = [](const std::vector<double>& of) { return of.front() < of.back(); };
+      if (ascends(values) != ascends(axis.coordinates)) {
+        return wrong(path, "its order is not that of a dataset, in which levels are stored");
+      }
+    }
+    return {};
+  }
+
+  // Samples of levels are read as they are stored.
+  Result<void> check_finest(const std::string& component) const {
+    const Array& array = store_->finest.at(component);
+    const std::string path = in_finest(component);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Axis& axis = info_.grid.axes.at(a);
+      const bool is_there = array.dimensions.size() == 4 && array.dimensions[3 - a] == axis.name;
+      if (!is_there && axis.coordinates.size() > 1) {
+        return wrong(path, "its dimensions are not those of levels: time, z, y, x");
+      }
+    }
+    for (const char* const name : {"scale_factor", "add_offset", "_FillValue", "missing_value",
+                                   "valid_min", "valid_max", "valid_range"}) {
+      if (array.attributes.find(name) != nullptr) {
+        return wrong(path, std::string("has the attribute ") + name + ", its levels have not");
+      }
+    }
+    return {};
+  }
+
   Result<void> read_widths(StoredLevels& stored) const {
     for (std::size_t a = 0; a < 3; ++a) {
       const std::string& path = store_->names.widths.at(a);
@@ -156,12 +199,18 @@ class LevelSource final : public FileSource {
     }
     if (!same->is_read_by_boxes()) return {};
     const auto f = static_cast<std::size_t>(same - info_.fields.begin());
+    if (!names_.emplace(f, &names).second) {
+      return wrong("", "/fields has " + in_quotes(same->name) + " twice");
+    }
     if (stored.fields.size() <= f) stored.fields.resize(f + 1);
-    names_[f] = &names;
     StoredField& field = stored.fields[f];
     if (auto done = read_ranges(names, field); !done) return done;
     field.has_levels = names.as != LevelNames::Field::As::nothing && stored.levels.size() > 1;
     field.strided = field.has_levels ? names.strided : 0;
+    for (const std::string& component : names.components) {
+      if (!field.has_levels) break;
+      if (auto done = check_finest(component); !done) return done;
+    }
     for (std::size_t n = 1; n < stored.levels.size() && field.has_levels; ++n) {
       const auto strided = static_cast<int>(n);
       if (auto done = find_arrays({f, n, false}, stored.levels[n]); !done) return done;
