@@ -1,5 +1,7 @@
 // A dataset read by a loader, which is started on demand; volumes come back in shared memory.
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -10,7 +12,9 @@
 #include "server/data/loader/loader.hpp"
 #include "server/data/loader/running_loader.hpp"
 #include "server/data/loader/transfer.hpp"
+#include "server/data/model/box.hpp"
 #include "server/data/model/digest.hpp"
+#include "server/data/model/stored.hpp"
 
 namespace windsplat::data::loader {
 
@@ -34,6 +38,18 @@ RunningLoader::Call call_for(const DatasetInfo& info, const Wanted& wanted) {
   what.answer = Kind::filled;
   what.doing = "reading " + in_quotes(info.fields[wanted.field].name);
   return what;
+}
+
+// Of what is decoded for a part: the chunks that it lies in, or its whole level, whose chunks are
+// not known.
+std::uint64_t decoded_bytes(const DatasetInfo& info, std::size_t field, const StoredPart& part) {
+  const FieldInfo& about = info.fields[field];
+  const auto dims = stored_dims(info, field, part.level, part.as).value_or(info.grid.dims());
+  const auto values = static_cast<std::size_t>(components_of(about, part.as));
+  const std::uint64_t all = whole_box(dims).samples() * values * sizeof(float);
+  if (part.level > 0 || !about.is_read_by_boxes()) return all;
+  const double share = decoded_share(part.box, 1, about, dims);
+  return std::max(about.chunk_bytes, static_cast<std::uint64_t>(share * static_cast<double>(all)));
 }
 
 // The time of a call that reads so many bytes.
@@ -200,9 +216,7 @@ struct RemoteSource::State {
       transfer = std::move(*made);
     }
     RunningLoader::Call what = call_for(info, {field, step, part, 0, transfer->is_kept()});
-    // A box may be decoded from chunks of the whole step.
-    const std::size_t components = info.fields[field].components.size();
-    what.time = time_to_read(limits, info.grid.samples() * components * sizeof(float));
+    what.time = time_to_read(limits, decoded_bytes(info, field, part));
     if (is_new) what.descriptor = transfer->descriptor();
     if (auto done = loader.call(what); !done) {
       if (loader.is_released()) drop_transfer();  // has ended

@@ -280,6 +280,17 @@ TEST_F(FaultyBoxes, InvalidNumbersAreRefused) {
   EXPECT_FALSE(is_running_);
 }
 
+// 200 ms, and 100 for its 16 bytes; the step has 64.
+TEST_F(FaultyBoxes, AreGivenTheTimeOfTheirChunks) {
+  limits_.read_time = milliseconds(200);
+  limits_.read_bytes_per_second = 160;
+  respond_with("send_info()\nwhile True: pass\n");
+  const auto part = read_box();
+  ASSERT_FALSE(part);
+  EXPECT_EQ(part.error().message,
+            "the loader of 'some.nc' was terminated after 0.3 s while reading 'wind'");
+}
+
 TEST_F(FaultyBoxes, BeyondTheGridAreNotAskedFor) {
   respond_with("send_info()\n");
   auto source = opened();
