@@ -42,7 +42,9 @@ class DerivedSource final : public FileSource {
     // They are computed as a whole.
     std::erase_if(rules_, [&](const Rule& rule) {
       const std::size_t values = info_.grid.samples() * rule.info.components.size();
-      return values * sizeof(float) > volume_bytes_max;
+      if (values * sizeof(float) <= volume_bytes_max) return false;
+      info_.left_out.push_back({rule.info.name, "computed as a whole, of more than 16 GiB a step"});
+      return true;
     });
     for (const Rule& rule : rules_) info_.fields.push_back(rule.info);
     source_->on_progress([this](double done) { report_progress(done_ + share_ * done); });

@@ -41,6 +41,24 @@ TEST(DerivedFields, AVelocityInSpaceHasSeven) {
   EXPECT_EQ(names_of(box(), velocity), all_of_velocity);
 }
 
+// 8192 x 1024 x 512 samples.
+TEST(DerivedFields, OfMoreThan16GiBAreLeftOutByName) {
+  Grid grid = box();
+  grid.axes[0] = axis_of(AxisKind::cartesian, "m", evenly(0, 1, 8192));
+  grid.axes[1] = axis_of(AxisKind::cartesian, "m", evenly(0, 1, 1024));
+  grid.axes[2] = axis_of(AxisKind::cartesian, "m", evenly(0, 1, 512));
+  auto source = std::make_unique<FormulaSource>(grid);
+  source->add("v", velocity, zero);
+  const auto derived = derive(std::move(source));
+  Names left;
+  for (const LeftOut& one : derived->info().left_out) {
+    left.push_back(one.name);
+    EXPECT_EQ(one.reason, "computed as a whole, of more than 16 GiB a step");
+  }
+  EXPECT_EQ(left, Names{"v_vorticity"});
+  EXPECT_EQ(names_of(derived->info()).size(), all_of_velocity.size() - 1);
+}
+
 TEST(DerivedFields, AHorizontalVelocityHasThoseOfTheLevels) {
   EXPECT_EQ(names_of(box(), {"m s-1", "m s-1"}),
             (Names{"v_speed", "v_vertical_vorticity", "v_divergence"}));
