@@ -210,15 +210,28 @@ http::Response range_response(const data::FieldRange& range, const char* of) {
   return json_response(protocol::encode_range({range.range, range.masked, of, {}}));
 }
 
+std::size_t index_of(const data::DatasetInfo& info, const data::FieldInfo& field) {
+  return static_cast<std::size_t>(info.find(field.name) - info.fields.data());
+}
+
 http::Response step_range(const Subject& subject, std::size_t step) {
+  // Of a field that does not fit into memory: stored, without the places.
+  const data::Dataset& dataset = *subject.dataset;
+  const data::DatasetInfo& info = dataset.info();
+  if (!dataset.subtrahend() && !dataset.fits_in_full({subject.field.name})) {
+    if (const auto* const stored = data::stored_range(info, index_of(info, subject.field), step)) {
+      data::FieldRange range;
+      range.add(*stored, info.grid.samples());
+      return range_response(range, "step");
+    }
+  }
   const auto volume = load(subject, step);
   if (!volume) return http::problem_response(volume.error());
   data::FieldRange range;
   range.add(**volume);
   protocol::RangeDescription out{range.range, range.masked, "step", {}};
   if (const auto places = data::extremes(**volume)) {
-    const data::Grid& grid = subject.dataset->info().grid;
-    out.places = {position_of(grid, places->least), position_of(grid, places->greatest)};
+    out.places = {position_of(info.grid, places->least), position_of(info.grid, places->greatest)};
   }
   return json_response(protocol::encode_range(out));
 }
@@ -226,7 +239,7 @@ http::Response step_range(const Subject& subject, std::size_t step) {
 // Over all steps, if the source has stored it.
 std::optional<data::FieldRange> stored_range(const data::DatasetInfo& info,
                                              const data::FieldInfo& field) {
-  const auto index = static_cast<std::size_t>(info.find(field.name) - info.fields.data());
+  const std::size_t index = index_of(info, field);
   data::FieldRange out;
   for (std::size_t step = 0; step < info.steps.size(); ++step) {
     const auto* const stored = data::stored_range(info, index, step);
