@@ -155,10 +155,12 @@ class Images {
 };
 
 OrderedJson windsplat_of(const data::DatasetInfo& info, const Plan& plan,
-                         const std::string& contents) {
+                         const std::vector<std::uint64_t>& bytes, const std::string& contents) {
   OrderedJson levels = OrderedJson::array();
   for (std::size_t n = 0; n < plan.levels.size(); ++n) {
-    levels.push_back({{"path", std::to_string(n)}, {"halvings", plan.levels[n].how.halvings}});
+    levels.push_back({{"path", std::to_string(n)},
+                      {"halvings", plan.levels[n].how.halvings},
+                      {"storedBytes", bytes.at(n)}});
   }
   OrderedJson fields = OrderedJson::array();
   for (const PlannedField& field : plan.fields) {
@@ -198,7 +200,7 @@ OrderedJson windsplat_of(const data::DatasetInfo& info, const Plan& plan,
 }  // namespace
 
 OrderedJson root_attributes(const data::DatasetInfo& info, const Plan& plan,
-                            const std::string& contents) {
+                            const std::vector<std::uint64_t>& bytes, const std::string& contents) {
   const Images images(info, plan);
   OrderedJson out = OrderedJson::object();
   if (plan.format == data::zarr::StoreFormat::v3) {
@@ -206,7 +208,7 @@ OrderedJson root_attributes(const data::DatasetInfo& info, const Plan& plan,
   } else {
     out["multiscales"] = images.list("0.4");
   }
-  out["windsplat"] = windsplat_of(info, plan, contents);
+  out["windsplat"] = windsplat_of(info, plan, bytes, contents);
   return out;
 }
 

@@ -239,8 +239,9 @@ class Finisher {
         arrays.push_back(std::move(one.array));
       }
     }
+    const std::vector<std::uint64_t> bytes = bytes_of_levels();
     std::vector<data::zarr::WrittenGroup> groups = level_groups(info_, plan_);
-    groups.push_back({"", root_attributes(info_, plan_, no_contents)});
+    groups.push_back({"", root_attributes(info_, plan_, bytes, no_contents)});
     for (const auto& [path, text] : metadata_files(arrays, groups)) {
       checksums_[path] = checksum_of(text);
     }
@@ -248,11 +249,25 @@ class Finisher {
     if (auto done = write_whole_file(store_ / checksums_name, list, Sync::now); !done) {
       return done.error();
     }
-    groups.back().attributes = root_attributes(info_, plan_, data::digest_of(list));
+    groups.back().attributes = root_attributes(info_, plan_, bytes, data::digest_of(list));
     if (auto done = write_metadata(store_, arrays, groups); !done) return done.error();
     if (auto done = remove_others(); !done) return done.error();
-    std::uint64_t bytes = list.size();
-    for (const auto& [path, sum] : checksums_) bytes += sum.bytes;
+    std::uint64_t total = list.size();
+    for (const auto& [path, sum] : checksums_) total += sum.bytes;
+    return total;
+  }
+
+  // Of the files of their arrays.
+  [[nodiscard]] std::vector<std::uint64_t> bytes_of_levels() const {
+    std::vector<std::uint64_t> bytes;
+    for (std::size_t level = 0; level < plan_.levels.size(); ++level) {
+      const std::string folder = std::to_string(level) + '/';
+      bytes.push_back(0);
+      for (auto at = checksums_.lower_bound(folder);
+           at != checksums_.end() && at->first.starts_with(folder); ++at) {
+        bytes.back() += at->second.bytes;
+      }
+    }
     return bytes;
   }
 

@@ -192,6 +192,8 @@ std::shared_ptr<const StoredLevels> stored_of(Reader& in, const DatasetInfo& inf
   for (std::size_t a = 0; a < 3; ++a) {
     stored.widths.at(a) = in.doubles(info.grid.axes.at(a).coordinates.size());
   }
+  stored.bytes.resize(in.count(stored_levels_max, sizeof(std::uint64_t)));
+  for (std::uint64_t& bytes : stored.bytes) bytes = in.number<std::uint64_t>();
   stored.fields.resize(in.count(info.fields.size(), text_bytes_min));
   for (StoredField& field : stored.fields) {
     const auto has_levels = in.number<std::uint8_t>();
@@ -218,6 +220,8 @@ void put_stored(Writer& out, const StoredLevels& stored) {
     for (const int h : level) out.number(static_cast<std::int32_t>(h));
   }
   for (const auto& widths : stored.widths) out.doubles(widths);
+  out.count(stored.bytes.size());
+  for (const std::uint64_t bytes : stored.bytes) out.number(bytes);
   out.count(stored.fields.size());
   for (const StoredField& field : stored.fields) {
     out.number(static_cast<std::uint8_t>(field.has_levels ? 1 : 0));

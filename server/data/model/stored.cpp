@@ -48,6 +48,9 @@ std::string fault_of_levels(const StoredLevels& stored, const DatasetInfo& info)
       return "level " + std::to_string(n) + " has the halvings of the one before";
     }
   }
+  if (!stored.bytes.empty() && stored.bytes.size() != levels.size()) {
+    return "the bytes of levels are not those of each level";
+  }
   for (std::size_t a = 0; a < 3; ++a) {
     if (!are_widths(stored.widths.at(a), info.grid.axes.at(a).coordinates.size())) {
       return "the cell widths of an axis are not positive numbers, one for each sample";

@@ -49,6 +49,8 @@ struct StoredLevels {
   // Halvings of the axes by level, none less than at the level before; the first has none.
   std::vector<std::array<int, 3>> levels;
   std::array<std::vector<double>, 3> widths;  // of cells, weights of two values; empty: even
+  // Of the files of each level, at all steps, as the store claims them; empty: not known.
+  std::vector<std::uint64_t> bytes;
   std::vector<StoredField> fields;  // of the first fields of the dataset, the others have none
 };
 

@@ -159,6 +159,8 @@ TEST(ZarrLevels, AttributesThatDoNotFitAreRefused) {
            {R"([0,0,0])", R"([0,0,1])", "the first has halvings"},
            {R"([3,2,2])", R"([3,3,2])",
             "'3/u': has the shape (2, 3, 4, 3), its level (2, 3, 2, 3)"},
+           {R"([2,2,1])", R"([2,2,1],"storedBytes":-1)", "/levels/2/storedBytes is not a number"},
+           {R"([2,2,1])", R"([2,2,1],"storedBytes":"7")", "/levels/2/storedBytes is not a number"},
            {R"("path":"3")", R"("path":"../3")", "/levels/3/path is not the path of a group"},
            {R"("path":"3")", R"("path":"4")", "'4/u': the array is missing"},
            {R"("strided":2)", R"("strided":3)", "'3/u_strided': the array is missing"},
@@ -212,6 +214,23 @@ TEST(ZarrLevels, OfALevelZeroThatIsNotReadAsItIsStoredAreRefused) {
   turned.write_array("0/v", {2, 9, 21, 13}, "float32", "", {"time", "lev", "lon", "lat"},
                      R"({"units":"m s-1","windsplat_vector":"wind 1"})");
   EXPECT_THAT(refusal(turned.path()), HasSubstr("'0/v': its dimensions are not those of levels"));
+}
+
+TEST(ZarrLevels, BytesOfFilesAreKnownIfAllLevelsHaveThem) {
+  const LevelStore store;
+  std::string attribute =
+      replaced(LevelStore::attribute(), "[2,2,1]", R"([2,2,1],"storedBytes":7)");
+  store.write_root(attribute);
+  auto source = opened(store.path());
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(source->info().stored->bytes.empty());
+  for (const char* const level : {"[0,0,0]", "[1,1,1]", "[3,2,2]"}) {
+    attribute = replaced(attribute, level, std::string(level) + R"(,"storedBytes":9)");
+  }
+  store.write_root(attribute);
+  source = opened(store.path());
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(source->info().stored->bytes, ElementsAre(9, 9, 7, 9));
 }
 
 TEST(ZarrLevels, ArraysOfOtherShapesAndTypesAreRefused) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -30,6 +31,7 @@ DatasetInfo with_levels() {
   StoredLevels stored;
   stored.levels = {{0, 0, 0}, {1, 1, 1}};
   stored.widths[2] = {1, 2, 3, 4};
+  stored.bytes = {96, 24};
   stored.fields.resize(2);
   stored.fields[1].has_levels = true;
   stored.fields[1].ranges = {{{1, 2}, 3}, {{0, 0}, 24}};
@@ -62,6 +64,7 @@ TEST(LoaderMessages, LevelsThatNoStoreHasAreRefused) {
       {"a width of 0", [](StoredLevels& s) { s.widths[2][1] = 0; }},
       {"a width that is not a number", [](StoredLevels& s) { s.widths[2][1] = NAN; }},
       {"an infinite width", [](StoredLevels& s) { s.widths[2][1] = INFINITY; }},
+      {"bytes of one level of two", [](StoredLevels& s) { s.bytes = {7}; }},
       {"more fields than there are", [](StoredLevels& s) { s.fields.resize(3); }},
       {"levels of a field that is not read by boxes",
        [](StoredLevels& s) { s.fields[0].has_levels = true; }},
@@ -75,7 +78,9 @@ TEST(LoaderMessages, LevelsThatNoStoreHasAreRefused) {
        [](StoredLevels& s) { s.fields[1].ranges[1].masked = 25; }},
       {"fewer than no masked samples", [](StoredLevels& s) { s.fields[1].ranges[1].masked = -1; }},
   };
-  ASSERT_TRUE(decode_info(encode_info(with_levels())));
+  const auto sound = decode_info(encode_info(with_levels()));
+  ASSERT_TRUE(sound);
+  EXPECT_EQ(sound->stored->bytes, (std::vector<std::uint64_t>{96, 24}));
   for (const auto& [what, lie] : lies) {
     DatasetInfo info = with_levels();
     StoredLevels stored = *info.stored;

@@ -43,6 +43,12 @@ Result<LevelNames::Level> level_at(const Json& json, const std::string& place) {
     if (!h) return h.error();
     out.halvings.at(a) = *h;
   }
+  if (const Json* const bytes = json.find("storedBytes")) {
+    if (!bytes->is_integer || bytes->integer < 0) {
+      return wrong(place + "/storedBytes is not a number of bytes");
+    }
+    out.bytes = static_cast<std::uint64_t>(bytes->integer);
+  }
   return out;
 }
 

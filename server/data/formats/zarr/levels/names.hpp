@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct LevelNames {
   struct Level {
     std::string path;  // of a group
     std::array<int, 3> halvings{};
+    std::optional<std::uint64_t> bytes;  // of its files
   };
   struct Field {
     enum class As { nothing, two_values, drawn };

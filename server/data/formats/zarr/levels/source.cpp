@@ -36,8 +36,10 @@ class LevelSource final : public FileSource {
     StoredLevels stored;
     for (const LevelNames::Level& level : store_->names.levels) {
       stored.levels.push_back(level.halvings);
+      if (level.bytes) stored.bytes.push_back(*level.bytes);
     }
     if (auto done = check_directions(); !done) return done;
+    if (stored.bytes.size() < stored.levels.size()) stored.bytes.clear();
     if (auto done = read_widths(stored); !done) return done;
     if (const std::string fault = fault_of(stored, info_); !fault.empty()) return wrong("", fault);
     for (const LevelNames::Field& names : store_->names.fields) {
