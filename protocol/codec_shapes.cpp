@@ -188,6 +188,19 @@ Json dataset_summary_json(const DatasetDescription& dataset) {
               {"notes", dataset.notes}};
 }
 
+Json levels_json(const std::vector<LevelDescription>& levels) {
+  Json out = Json::array();
+  for (const LevelDescription& level : levels) {
+    Json one{{"dims", {{"x", level.dims[0]}, {"y", level.dims[1]}, {"z", level.dims[2]}}},
+             {"halvings", level.halvings},
+             {"bricks", level.bricks},
+             {"bytes", level.bytes}};
+    if (level.stored_bytes) one["storedBytes"] = *level.stored_bytes;
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
 Json dataset_json(const DatasetDescription& dataset) {
   Json left_out = Json::array();
   for (const auto& [name, reason] : dataset.left_out) {
@@ -227,6 +240,7 @@ Json dataset_json(const DatasetDescription& dataset) {
   out["steps"] = {{"count", dataset.steps.size()}, {"times", std::move(times)}};
   out["timeUnits"] = dataset.time_units;
   out["timeCalendar"] = dataset.time_calendar;
+  if (!dataset.levels.empty()) out["levels"] = levels_json(dataset.levels);
   out["bytesWhenResident"] = dataset.bytes_when_resident;
   if (!dataset.default_view.dataset.empty()) {
     out["defaultView"] = view_to_json(dataset.default_view);

@@ -100,6 +100,14 @@ struct GroundDescription {
   std::string kind;  // "land" | "seaFloor"
   Range range{};     // metres above sea level
 };
+// A level of the fields of a dataset; of the first one, full detail, the halvings are 0.
+struct LevelDescription {
+  std::array<int, 3> dims{};      // samples along x, y and z
+  std::array<int, 3> halvings{};  // of these axes
+  std::uint64_t bricks = 0;       // of each array at a step
+  std::uint64_t bytes = 0;        // of the fields that have the level, at a step, in memory
+  std::optional<std::uint64_t> stored_bytes;  // of its files, at all steps
+};
 struct DatasetDescription {
   std::string id;
   std::string title;
@@ -117,6 +125,7 @@ struct DatasetDescription {
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
   std::vector<std::string> notes;  // conversions of the data, problems found
   std::vector<ChoiceDescription> choices;
+  std::vector<LevelDescription> levels;  // empty: no coarser levels are stored
   std::vector<StepDescription> steps;
   std::size_t step_count = 0;  // number of steps, even if `steps` is omitted
   std::string time_units;

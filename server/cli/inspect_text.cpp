@@ -242,6 +242,20 @@ std::string choices_text(const protocol::DatasetDescription& dataset) {
   return "\nchosen\n" + table(rows);
 }
 
+std::string levels_text(const protocol::DatasetDescription& dataset) {
+  if (dataset.levels.empty()) return "";
+  std::vector<Row> rows;
+  for (std::size_t n = 0; n < dataset.levels.size(); ++n) {
+    const protocol::LevelDescription& level = dataset.levels[n];
+    std::string dims;
+    for (const int dim : level.dims) dims += (dims.empty() ? "" : " x ") + std::to_string(dim);
+    rows.push_back({std::to_string(n), dims + " samples", std::to_string(level.bricks) + " bricks",
+                    byte_count(level.bytes) + " in memory at a step",
+                    level.stored_bytes ? byte_count(*level.stored_bytes) + " on disk" : ""});
+  }
+  return "\nlevels\n" + table(rows);
+}
+
 }  // namespace
 
 std::string inspect_text(const protocol::DatasetDescription& dataset) {
@@ -252,7 +266,7 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
   out += "memory " + byte_count(dataset.bytes_when_resident) +
          " with every field resident at every step\n\n";
   out += grid_text(dataset) + '\n' + fields_text(dataset) + '\n' + steps_text(dataset);
-  out += choices_text(dataset);
+  out += levels_text(dataset) + choices_text(dataset);
   if (!dataset.left_out.empty()) {
     std::size_t width = 0;
     for (const auto& left : dataset.left_out) width = std::max(width, word(left.first).size());

@@ -148,6 +148,39 @@ void add_bounded(const std::vector<std::string>& unread, std::vector<std::string
                   " more fields are not known");
 }
 
+std::vector<protocol::LevelDescription> describe_levels(const data::DatasetInfo& info) {
+  std::vector<protocol::LevelDescription> out;
+  if (!info.stored || info.stored->levels.size() < 2) return out;
+  std::array<int, 3> brick{1, 1, 1};
+  for (const data::FieldInfo& field : info.fields) {
+    if (field.is_read_by_boxes()) brick = field.box_chunk;
+  }
+  for (std::size_t n = 0; n < info.stored->levels.size(); ++n) {
+    protocol::LevelDescription level;
+    level.halvings = info.stored->levels[n];
+    level.bricks = 1;
+    std::uint64_t samples = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      level.dims.at(a) = data::halved(info.grid.dims().at(a), level.halvings.at(a));
+      samples *= static_cast<std::uint64_t>(level.dims.at(a));
+      level.bricks *=
+          static_cast<std::uint64_t>((level.dims.at(a) - 1) / std::max(1, brick.at(a)) + 1);
+    }
+    for (std::size_t f = 0; f < info.fields.size(); ++f) {
+      const data::FieldInfo& field = info.fields[f];
+      const bool is_vector = field.kind == data::FieldKind::vector;
+      const auto as = n == 0      ? data::StoredAs::samples
+                      : is_vector ? data::StoredAs::drawn
+                                  : data::StoredAs::two_values;
+      if (field.derived || !data::stored_dims(info, f, n, as)) continue;
+      level.bytes += samples * static_cast<std::uint64_t>(components_of(field, as)) * sizeof(float);
+    }
+    if (!info.stored->bytes.empty()) level.stored_bytes = info.stored->bytes.at(n);
+    out.push_back(level);
+  }
+  return out;
+}
+
 // The view that a dataset is first shown with, and notes on it. `has_damage`: some fields cannot be
 // read.
 Result<void> add_default_view(data::Dataset& dataset, bool has_damage, RangesOf ranges,
@@ -263,6 +296,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   for (const data::DimensionChoice& choice : info.choices) {
     out.choices.push_back({choice.name, choice.length, choice.values, choice.chosen});
   }
+  out.levels = describe_levels(info);
   out.notes = info.notes;
   add_bounded(unread, out.notes);
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});

@@ -60,6 +60,8 @@ DatasetDescription climate() {
   dataset.left_out = {{"ps", "two-dimensional"}};
   dataset.notes = {"winds were turned from the grid's axes to east and north"};
   dataset.choices = {{"number", 3, {"0", "1", "2"}, "1"}};
+  dataset.levels = {{{2, 1, 3}, {0, 0, 0}, 1, 72, 6'000'000'000},
+                    {{1, 1, 2}, {1, 0, 1}, 1, 24, std::nullopt}};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
   dataset.time_units = "hours since 2001-01-01";
   dataset.time_calendar = "noleap";
@@ -244,6 +246,10 @@ TEST(Shapes, DatasetInFull) {
   EXPECT_EQ(dataset["leftOut"], Json::parse(R"([{"name":"ps","reason":"two-dimensional"}])"));
   EXPECT_EQ(dataset["choices"],
             Json::parse(R"([{"name":"number","length":3,"values":["0","1","2"],"chosen":"1"}])"));
+  EXPECT_EQ(dataset["levels"], Json::parse(R"([
+      {"dims":{"x":2,"y":1,"z":3},"halvings":[0,0,0],"bricks":1,"bytes":72,
+       "storedBytes":6000000000},
+      {"dims":{"x":1,"y":1,"z":2},"halvings":[1,0,1],"bricks":1,"bytes":24}])"));
   EXPECT_EQ(dataset["timeUnits"], "hours since 2001-01-01");
   EXPECT_EQ(dataset["timeCalendar"], "noleap");
   EXPECT_EQ(dataset["residentBytes"], 48);
@@ -254,6 +260,7 @@ TEST(Shapes, DatasetInFull) {
 TEST(Shapes, UnreadDatasetHasNoRangesAndNoView) {
   DatasetDescription dataset = climate();
   dataset.default_view = View{};
+  dataset.levels.clear();
   dataset.fields[0].range.reset();
   dataset.fields[0].masked.reset();
   dataset.fields[0].range_of.clear();
@@ -261,6 +268,7 @@ TEST(Shapes, UnreadDatasetHasNoRangesAndNoView) {
   expect_shape("dataset", json);
   const Json told = Json::parse(json);
   EXPECT_FALSE(told.contains("defaultView"));
+  EXPECT_FALSE(told.contains("levels"));
   EXPECT_TRUE(told["fields"][0]["range"].is_null());
   EXPECT_TRUE(told["fields"][0]["masked"].is_null());
 }

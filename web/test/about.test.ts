@@ -48,6 +48,24 @@ test("tells what was read, converted and left out", () => {
   assert.equal(rows[""], "averaged to mass points");
 });
 
+test("tells the levels of a store", () => {
+  const levels = [
+    {
+      dims: { x: 520, y: 140, z: 133 },
+      halvings: [0, 0, 0],
+      bricks: 81,
+      bytes: 9,
+      storedBytes: 4e8,
+    },
+    { dims: { x: 260, y: 70, z: 67 }, halvings: [1, 1, 1], bricks: 1, bytes: 9 },
+  ];
+  const sections = aboutSections({ ...dataset, levels } as unknown as Dataset);
+  assert.deepEqual(sections.find(({ title }) => title === "Levels of detail")?.rows, [
+    ["0", "520 x 140 x 133 samples in 81 bricks, 400.0 MB on disk"],
+    ["1", "260 x 70 x 67 samples in one brick"],
+  ]);
+});
+
 test("has no empty sections", () => {
   const sections = aboutSections({ ...dataset, leftOut: [], notes: [] });
   assert.deepEqual(

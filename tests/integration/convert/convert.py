@@ -188,6 +188,26 @@ class Convert(unittest.TestCase):
                    for one in text["fields"]} for text in told]
         self.assertEqual(fields[0], fields[1])
 
+    def test_inspect_tells_levels_with_their_bricks_and_bytes(self):
+        source, _ = write_raw(self.folder, "even", (520, 140, 133), self.rng)
+        store = self.converted(source, "--threads", 2)
+        told = json.loads(subprocess.run([PROGRAM, "inspect", "--json", store.folder], check=True,
+                                         capture_output=True, text=True).stdout)["levels"]
+        self.assertEqual([tuple(level["halvings"]) for level in told], store.levels)
+        for number, level in enumerate(told):
+            shape = store.nodes[f"{number}/u"]["shape"][1:]
+            self.assertEqual([level["dims"][axis] for axis in "zyx"], shape)
+            bricks = [-(-n // 64) for n in shape]
+            self.assertEqual(level["bricks"], np.prod(bricks))
+            # q and three components; at coarser levels q is two values with their shares.
+            self.assertEqual(level["bytes"], 4 * np.prod(shape) * (4 if number == 0 else 7))
+            files = [one.stat().st_size for one in (store.folder / str(number)).rglob("*")
+                     if one.is_file() and one.name != "zarr.json"]
+            self.assertEqual(level["storedBytes"], sum(files))
+        text = subprocess.run([PROGRAM, "inspect", store.folder], check=True,
+                              capture_output=True, text=True).stdout
+        self.assertRegex(text, r"\nlevels\n  0  520 x 140 x 133 samples  81 bricks")
+
     def test_what_is_refused(self):
         source = write_pressures(self.folder / "gcm.nc", (3, 30, 40), self.rng)
         out = self.folder / "gcm.zarr"

@@ -1,12 +1,13 @@
 // "About this dataset": what the file has, how it was read and what was left out of it.
 import { byId, make } from "../base/dom";
-import { formatNumber } from "../base/ticks";
+import { formatBytes, formatNumber } from "../base/ticks";
 import { readableTime } from "@windsplat/client/parts";
 import { unitText } from "../view/unit_text";
 import { axisUnit, valueOnAxis } from "../view/sample_position";
 import type { Dataset } from "@windsplat/client";
 
 type Axis = Dataset["axes"]["x"];
+type Level = NonNullable<Dataset["levels"]>[number];
 type Row = readonly [name: string, text: string];
 
 export interface AboutSection {
@@ -45,9 +46,15 @@ function fieldRow(field: Dataset["fields"][number]): Row {
   return [field.name, [long === field.name ? "" : long, range].filter((part) => part).join("; ")];
 }
 
+function levelRow({ dims, bricks, storedBytes }: Level, number: number): Row {
+  const count = bricks === 1 ? "one brick" : `${bricks} bricks`;
+  const stored = storedBytes === undefined ? "" : `, ${formatBytes(storedBytes)} on disk`;
+  return [String(number), `${dims.x} x ${dims.y} x ${dims.z} samples in ${count}${stored}`];
+}
+
 // Only what the description has: a dataset without notes has no section of notes.
 export function aboutSections(dataset: Dataset): AboutSection[] {
-  const { axes, fields, leftOut, notes, source, format, steps } = dataset;
+  const { axes, fields, leftOut, levels, notes, source, format, steps } = dataset;
   const sections: AboutSection[] = [
     {
       title: "Data",
@@ -60,6 +67,7 @@ export function aboutSections(dataset: Dataset): AboutSection[] {
       ],
     },
     { title: "Fields", rows: fields.map(fieldRow) },
+    { title: "Levels of detail", rows: (levels ?? []).map(levelRow) },
     { title: "Left out", rows: leftOut.map(({ name, reason }) => [name, reason] as const) },
     { title: "Notes", rows: notes.map((note) => ["", note] as const) },
   ];
