@@ -128,6 +128,7 @@ class Boxes(unittest.TestCase):
         for dataset in ("large", "chunked"):
             notes = " ".join(self.get(dataset).json()["notes"])
             self.assertRegex(notes, "is not shown, but its fields can be probed: .* would suffice")
+            self.assertIn("a store that 'windsplat convert' makes of the dataset", notes)
             answer = self.daemon.get(f"/v1/datasets/{dataset}/frame.png?width=32&height=32")
             status, detail = answer.detail()
             self.assertEqual(status, 507, detail)

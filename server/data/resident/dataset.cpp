@@ -14,6 +14,15 @@ namespace {
 
 using VolumePtr = std::shared_ptr<const Volume>;
 
+// Whether a store that is made of the dataset would have levels of these fields.
+bool may_get_levels(const DatasetInfo& info, const std::vector<std::string>& fields) {
+  return info.stored == nullptr &&
+         std::all_of(fields.begin(), fields.end(), [&](const std::string& name) {
+           const FieldInfo* const field = info.find(name);
+           return field != nullptr && !field->derived && field->is_read_by_boxes();
+         });
+}
+
 }  // namespace
 
 Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max)
@@ -352,7 +361,9 @@ std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const 
     }
     text += " need " + megabytes(bytes) + " together: ";
   }
-  return text + budget.name().raised(all) + " would suffice";
+  text += budget.name().raised(all) + " would suffice";
+  if (minus_ || !may_get_levels(state_->info, fields)) return text;
+  return text + "; a store that 'windsplat convert' makes of the dataset is drawn within less";
 }
 
 Error Dataset::with_need(Error error, const std::vector<std::string>& fields) const {
