@@ -25,6 +25,7 @@ import model_files  # noqa: E402
 import model_mutations  # noqa: E402
 import model_writers  # noqa: E402
 import seeds  # noqa: E402
+import seeds_levels  # noqa: E402
 import seeds_vtk  # noqa: E402
 import sizes  # noqa: E402
 
@@ -183,6 +184,9 @@ def files(program):
             every += seeds.netcdf_seeds(program, folder)
     for i, seed in enumerate(every):
         yield from reader_input(f"seed-{i}", seed.kind, seed.files, seed.path)
+    with tempfile.TemporaryDirectory() as folder:
+        for name, members in seeds_levels.level_seeds(folder):
+            yield from reader_input(name, "zarr", members, "s.zarr")
     for number in range(MUTANTS):
         model = model_mutations.mutant(0, number)
         yield from reader_input(f"mutant-{number}", model.kind, *model_writers.written(model))

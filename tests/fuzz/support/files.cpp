@@ -17,6 +17,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/data/loader/messages.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/open/open.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
@@ -146,6 +147,33 @@ void expect_cut(Source& source, std::size_t field, std::size_t step, const Volum
          "a box has the values of the whole");
 }
 
+// Boxes of what is stored of a field at the levels of its store.
+void read_levels(Source& source, std::size_t field, std::size_t step) {
+  const DatasetInfo& info = source.info();
+  const std::size_t levels = info.stored ? info.stored->levels.size() : 0;
+  for (std::size_t level = 1; level < levels; ++level) {
+    for (const StoredAs as : {StoredAs::two_values, StoredAs::drawn, StoredAs::strided}) {
+      const auto dims = stored_dims(info, field, level, as);
+      if (!dims) continue;
+      StoredPart wanted{whole_box(*dims), level, as};
+      for (std::size_t a = 0; a < 3; ++a) {
+        wanted.box.first.at(a) = dims->at(a) / 3;
+        wanted.box.count.at(a) -= wanted.box.first.at(a);
+      }
+      auto part = source.read_part(field, step, wanted);
+      if (!part) {
+        expect(part.error().kind != ErrorKind::internal, "no file may cause an internal error",
+               part.error().message);
+        continue;
+      }
+      expect(part->dims == wanted.box.count &&
+                 part->components == components_of(info.fields[field], as),
+             "a box of a level has the size that was asked for");
+      expect(measure_part(info, field, step, as, *part), "values of a level are what they may be");
+    }
+  }
+}
+
 // The default view except for size and threshold, with both methods of streams.
 void draw(std::unique_ptr<FileSource> source) {
   if (source->info().grid.samples() > drawn_samples_max) return;
@@ -232,6 +260,7 @@ void read_dataset(const std::shared_ptr<Files>& files) {
   for (const auto& [field, step] : reads) {
     const FieldInfo& about = info.fields[field];
     if (info.grid.samples() * about.components.size() > floats_max) continue;
+    read_levels(**source, field, step);
     const auto volume = (*source)->read(field, step);
     if (volume) {
       expect_whole(*volume, info, about);
