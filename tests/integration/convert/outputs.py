@@ -35,13 +35,13 @@ class Outputs(unittest.TestCase):
         self.folder = pathlib.Path(self.temporary.name)
         self.addCleanup(self.temporary.cleanup)
 
-    def written(self, name, sides=(200, 131, 1)):
-        return write_raw(self.folder, name, sides, np.random.default_rng(3), 400)[0]
+    def written(self, name, seed=3):
+        return write_raw(self.folder, name, (200, 131, 1), np.random.default_rng(seed), 400)[0]
 
     def long(self):
-        """120 units: two fields at 60 steps."""
+        """24 units: two fields at 12 steps."""
         return write_pressures(self.folder / "long.nc", (3, 30, 40), np.random.default_rng(4),
-                               steps=60)
+                               steps=12)
 
     def ok(self, *arguments, **how):
         done = run(*arguments, **how)
@@ -122,11 +122,7 @@ class Outputs(unittest.TestCase):
                                      stderr=subprocess.PIPE, text=True)
                     for how in ("lz4", "none")]
             texts = [one.communicate()[1] for one in runs]
-            codes = [one.returncode for one in runs]
-            self.assertIn(0, codes, texts)
-            for code, text in zip(codes, texts):
-                if code != 0:
-                    self.assertIn("is being written by another run", text)
+            self.assertIn(0, [one.returncode for one in runs], texts)
             self.ok("--verify", store)
 
     def test_a_run_that_was_ended_after_the_renaming_is_completed(self):
@@ -161,16 +157,16 @@ class Outputs(unittest.TestCase):
         self.ok(source, "-o", store)
         letter = self.letter_in(self.folder / "out.zarr.verify")
         self.ok("--verify", store)
-        self.refused("differs", "--verify", store, self.written("other"), code=3)
+        self.refused("differs", "--verify", store, self.written("other", seed=5), code=3)
         self.assertTrue(letter.exists())
         self.assertEqual([one.name for one in self.folder.glob("*.verify*")], ["out.zarr.verify"])
 
     def test_workers_keep_within_the_files_that_may_be_open(self):
-        source = write_pressures(self.folder / "gcm.nc", (20, 140, 150), np.random.default_rng(4),
-                                 steps=3)
+        # Three units of each field, with five levels that they make.
+        source, _ = write_raw(self.folder, "long", (17000, 131, 1), np.random.default_rng(3), 400)
         store = self.folder / "out.zarr"
-        for soft, hard in ((64, 4096), (150, 150)):
-            self.ok(source, "-o", store, "--threads", 4, "--force",
+        for soft, hard in ((50, 4096), (90, 90)):
+            self.ok(source, "-o", store, "--threads", 3, "--force",
                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard)))
         self.ok("--verify", store)
 

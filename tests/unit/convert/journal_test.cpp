@@ -119,6 +119,24 @@ TEST(ConvertJournal, TwoRunsDoNotWriteOneStore) {
   EXPECT_EQ(second.error().kind, ErrorKind::conflict);
 }
 
+TEST(ConvertJournal, BegunAnewItEmptiesTheFolderUnlessAnotherRunHoldsIt) {
+  const test::Folder folder;
+  const Plan plan = plan_of();
+  add_units(folder.path(), plan);
+  auto first = Journal::open(folder.path(), plan, false);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(Journal::open(folder.path(), plan, true));
+  EXPECT_TRUE(fs::exists(folder / "0/q/c/4"));
+  first->reset();
+  EXPECT_EQ(done_in(folder.path(), plan).size(), 3U);
+  // Also one of another plan.
+  auto anew = Journal::open(folder.path(), plan_of("none"), true);
+  ASSERT_TRUE(anew) << anew.error().message;
+  EXPECT_TRUE((*anew)->done().empty());
+  EXPECT_FALSE(fs::exists(folder / "0"));
+  EXPECT_FALSE(fs::exists(folder / ".coarse"));
+}
+
 TEST(ConvertJournal, AFullDiskIsAnError) {
   const test::Folder folder;
   const auto journal = Journal::open(folder.path(), plan_of(), false);
