@@ -152,6 +152,7 @@ Result<Report> convert(const data::DatasetInfo& info, const std::vector<data::Co
   const fs::path part = output.native() + ".part";
   auto plan = make_plan(info, chain, options);
   if (!plan) return plan.error();
+  if (auto readable = check_metadata(info, *plan); !readable) return readable.error();
   const auto shares = share_memory(info, *plan, options);
   if (!shares) return shares.error();
   Report report;

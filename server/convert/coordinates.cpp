@@ -139,7 +139,7 @@ std::vector<std::string> coordinate_paths(const data::DatasetInfo& info, const P
   std::vector<std::string> out;
   for (std::size_t level = 0; level < plan.levels.size(); ++level) {
     const std::string group = std::to_string(level) + '/';
-    if (data::cf::has_times(info)) out.push_back(group + "time");
+    out.push_back(group + "time");  // a dimension in any case
     for (std::size_t a = 0; a < 3; ++a) {
       out.push_back(group + plain_name(data::cf::axis_name(info, a)));
       const std::string widths = widths_name(info, plan, a);

@@ -15,6 +15,7 @@
 #include "server/convert/coordinates.hpp"
 #include "server/convert/open_bricks.hpp"
 #include "server/convert/pencil.hpp"
+#include "server/data/formats/zarr/nodes.hpp"
 #include "server/data/formats/zarr/write/shard_writer.hpp"
 #include "server/data/model/digest.hpp"
 
@@ -37,6 +38,42 @@ Result<void> read_numbers(const fs::path& path, std::size_t offset, std::vector<
             static_cast<std::streamsize>(out.size() * sizeof(T)));
   if (file) return {};
   return make_error(ErrorKind::internal, "cannot read " + in_quotes(path.native()));
+}
+
+// All arrays and groups of a store. The root, which is the last, does not have the bytes of levels.
+struct Described {
+  std::vector<Coordinates> coordinates;
+  std::vector<data::zarr::WrittenArray> arrays;
+  std::vector<data::zarr::WrittenGroup> groups;
+};
+
+Described describe(const data::DatasetInfo& info, const Plan& plan) {
+  Described out;
+  out.arrays = plan.arrays;
+  for (std::size_t level = 0; level < plan.levels.size(); ++level) {
+    for (Coordinates& one : coordinates_of(info, plan, level)) {
+      out.arrays.push_back(one.array);
+      out.coordinates.push_back(std::move(one));
+    }
+  }
+  out.groups = level_groups(info, plan);
+  const std::vector<std::uint64_t> bytes(plan.levels.size());
+  out.groups.push_back({"", root_attributes(info, plan, bytes, no_contents)});
+  return out;
+}
+
+// Those of level 0, of ranges, and of the coarser levels without means, which are for others.
+std::size_t arrays_read(const Plan& plan, const std::vector<data::zarr::WrittenArray>& arrays) {
+  auto count = static_cast<std::size_t>(std::ranges::count_if(
+      arrays, [](const auto& array) { return array.path.starts_with("0/"); }));
+  for (const PlannedField& field : plan.fields) {
+    count += 2;
+    for (const Product& made : field.products) {
+      const bool is_mean = made.as == Reduced::mean || made.as == Reduced::mean_magnitude;
+      if (made.level > 0 && !is_mean) count += made.arrays.size();
+    }
+  }
+  return count;
 }
 
 class Finisher {
@@ -231,17 +268,13 @@ class Finisher {
 
   // Coordinates, checksums and metadata.
   Result<std::uint64_t> write_descriptions() {
-    std::vector<data::zarr::WrittenArray> arrays = plan_.arrays;
-    for (std::size_t level = 0; level < plan_.levels.size(); ++level) {
-      for (Coordinates& one : coordinates_of(info_, plan_, level)) {
-        auto done = note(write_array(store_, one.array, std::span<const double>(one.values)));
-        if (!done) return done.error();
-        arrays.push_back(std::move(one.array));
-      }
+    auto [coordinates, arrays, groups] = describe(info_, plan_);
+    for (const Coordinates& one : coordinates) {
+      auto done = note(write_array(store_, one.array, std::span<const double>(one.values)));
+      if (!done) return done.error();
     }
     const std::vector<std::uint64_t> bytes = bytes_of_levels();
-    std::vector<data::zarr::WrittenGroup> groups = level_groups(info_, plan_);
-    groups.push_back({"", root_attributes(info_, plan_, bytes, no_contents)});
+    groups.back().attributes = root_attributes(info_, plan_, bytes, no_contents);
     for (const auto& [path, text] : metadata_files(arrays, groups)) {
       checksums_[path] = checksum_of(text);
     }
@@ -299,6 +332,27 @@ class Finisher {
 };
 
 }  // namespace
+
+Result<void> check_metadata(const data::DatasetInfo& info, const Plan& plan) {
+  using data::zarr::arrays_max;
+  using data::zarr::metadata_bytes_max;
+  const Described all = describe(info, plan);
+  if (auto fit = check_arrays(all.arrays); !fit) return fit;
+  const auto refusal = [](const std::string& what, const std::string& most) {
+    return make_error(ErrorKind::invalid, "the store would have " + what + ", and at most " + most +
+                                              " are read; choose fewer fields by --field");
+  };
+  if (const std::size_t read = arrays_read(plan, all.arrays); read > arrays_max) {
+    return refusal(std::to_string(read) + " arrays of fields and levels",
+                   std::to_string(arrays_max));
+  }
+  for (const auto& [path, text] : metadata_files(all.arrays, all.groups)) {
+    if (text.size() <= metadata_bytes_max) continue;
+    return refusal(std::to_string(text.size() >> 10) + " KiB of metadata in " + in_quotes(path),
+                   std::to_string(metadata_bytes_max >> 10) + " KiB");
+  }
+  return {};
+}
 
 Result<std::uint64_t> finish(const data::DatasetInfo& info, const Plan& plan, const fs::path& store,
                              const std::map<std::size_t, UnitFiles>& units,

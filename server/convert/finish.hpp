@@ -14,6 +14,10 @@
 
 namespace windsplat::convert {
 
+// Whether the program can open a store of this plan, by its metadata. Errors: invalid, with the
+// limit.
+Result<void> check_metadata(const data::DatasetInfo& info, const Plan& plan);
+
 // Makes the store complete; the metadata of its root are written last. Files that do not belong to
 // it are removed, besides those whose names begin with a dot. Returns the bytes of all of its
 // files. Errors: cancelled; those of writing.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "server/convert/finish.hpp"
 #include "server/convert/memory.hpp"
 #include "server/convert/open_bricks.hpp"
 #include "tests/unit/convert/made_source.hpp"
@@ -159,6 +160,41 @@ TEST(ConvertPlan, WhatDoesNotExistOrCollidesIsRefused) {
   auto info = made_info(dims);
   info.fields[0].components = {"x"};  // as the axis
   EXPECT_NE(refusal(info, options_of()).find("'0/x'"), std::string::npos);
+}
+
+TEST(ConvertPlan, WhatTheReaderWouldNotOpenIsRefused) {
+  const Three dims{20, 20, 20};
+  auto info = made_info(dims);
+  data::FieldInfo field = info.fields[0];
+  field.long_name = std::string(400'000, 'q');
+  const auto plan_of_fields = [&](int count) {
+    info.fields.clear();
+    for (int n = 0; n < count; ++n) {
+      info.fields.push_back(field);
+      info.fields.back().name = info.fields.back().components[0] = "q" + std::to_string(n);
+    }
+    return make_plan(info, chain_of(dims, {{0, 0, 0}}), options_of()).value();
+  };
+  EXPECT_TRUE(check_metadata(info, plan_of_fields(10)));
+  const auto large = check_metadata(info, plan_of_fields(30));
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().kind, ErrorKind::invalid);
+  EXPECT_NE(large.error().message.find("KiB are read; choose fewer fields by --field"),
+            std::string::npos)
+      << large.error().message;
+  field.long_name.clear();
+  const auto many = check_metadata(info, plan_of_fields(3000));
+  ASSERT_FALSE(many);
+  EXPECT_NE(many.error().message.find("at most 8192 are read"), std::string::npos)
+      << many.error().message;
+}
+
+TEST(ConvertPlan, AnAxisWithTheNameOfTheStepsIsRefused) {
+  auto info = made_info({20, 20, 20});
+  info.grid.axes[0].name = "time";
+  const auto plan = make_plan(info, chain_of({20, 20, 20}, {{0, 0, 0}}), options_of());
+  ASSERT_FALSE(plan);
+  EXPECT_NE(plan.error().message.find("'0/time'"), std::string::npos) << plan.error().message;
 }
 
 TEST(ConvertMemory, TheLimitDecidesOnTheNumberOfWorkers) {

@@ -12,9 +12,6 @@ namespace windsplat::data::zarr {
 
 namespace {
 
-constexpr std::uint64_t json_bytes_max = std::uint64_t{8} << 20;
-constexpr std::size_t arrays_max = 8192;
-
 class Search {
  public:
   explicit Search(Files& files) : files_(files) {}
@@ -58,8 +55,9 @@ class Search {
     auto input = files_.open(path);
     if (!input) return input.error();
     const std::uint64_t size = (*input)->size();
-    if (size > json_bytes_max) {
-      return broken_store(path, "it has more than " + std::to_string(json_bytes_max) + " bytes");
+    if (size > metadata_bytes_max) {
+      return broken_store(path,
+                          "it has more than " + std::to_string(metadata_bytes_max) + " bytes");
     }
     std::string text(size, ' ');
     if (auto done = (*input)->read(0, text.data(), text.size()); !done) return done.error();

@@ -1,6 +1,8 @@
 // The arrays of a store and their metadata, of either version, consolidated or not.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,6 +33,10 @@ struct Nodes {
   std::vector<Node> level_arrays;    // of all that `levels` names beside level 0
   std::string identity;              // of the files read
 };
+
+// Of a metadata file, and of a store, whatever its version.
+inline constexpr std::uint64_t metadata_bytes_max = std::uint64_t{8} << 20;
+inline constexpr std::size_t arrays_max = 8192;
 
 // Errors: bad_data.
 Result<Nodes> find_nodes(Files& files);
