@@ -91,7 +91,7 @@ class Boxes(unittest.TestCase):
             cls.t = np.ma.filled(file["t"][:].astype("f4"), np.nan)[:, ::-1, ::-1]
         cls.daemon = Daemon(PROGRAM, folder / "large.json", folder / "chunked.nc",
                             folder / "times.nc", folder / "classic.nc", folder / "one_chunk.nc",
-                            f"--memory-limit={LIMIT}M")
+                            "tornado:2048x2048x1536", f"--memory-limit={LIMIT}M")
 
     @classmethod
     def tearDownClass(cls):
@@ -140,6 +140,14 @@ class Boxes(unittest.TestCase):
         self.assertEqual(failed, ["one_chunk"])
         self.assertRegex(" ".join(listed["one_chunk"]["notes"]),
                          "'t' needs 73.2 MiB at a step; .* would suffice")
+
+    def test_arrays_that_read_far_more_than_they_have_are_refused(self):
+        path = "/v1/datasets/tornado:2048x2048x1536/fields/wind/values.npy?stride=256,256"
+        status, detail = self.daemon.get(f"{path},1").detail()
+        self.assertEqual(status, 422, detail)
+        self.assertIn("would read 73728.0 MiB of 'wind', and a request reads at most 16384.0 MiB",
+                      detail)
+        self.assertEqual(self.daemon.get(f"{path},512").status, 200)
 
     def loads(self):
         text = self.daemon.get("/metrics").body.decode()

@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstring>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +19,7 @@
 #include "protocol/limits.hpp"
 #include "server/api/ascii_json.hpp"
 #include "server/api/measure/positions.hpp"
+#include "server/api/measure/selection.hpp"
 #include "server/api/measure/subject.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
@@ -163,18 +163,6 @@ Result<scene::Crop> columns_of(const ValuesQuery& asked, const data::Grid& grid)
   return refuse_values("bbox", ": " + (error.at.empty() ? error.message : error.at.front().detail));
 }
 
-// What is read: a box of samples, every so many of which are taken.
-struct Selection {
-  scene::Crop crop;
-  std::array<int, 3> stride{1, 1, 1};
-  std::array<std::size_t, 3> count{};  // of the samples that are taken: x, y, z
-  bool one_level = false;              // the array has no dimension z
-  std::size_t components = 1;
-  std::size_t step = 0;
-
-  [[nodiscard]] std::size_t values() const { return components * count[0] * count[1] * count[2]; }
-};
-
 Result<void> check_size(const Selection& selection) {
   const std::uint64_t bytes = std::uint64_t{sizeof(float)} * selection.values();
   if (bytes <= protocol::limits::values_bytes_max) return {};
@@ -277,103 +265,6 @@ void add_columns(const data::Columns& columns, int width, const Selection& selec
   }
 }
 
-// The indices from..to of the samples of a selection along an axis that lie in a range.
-struct Taken {
-  int from = 0;
-  int to = 0;
-};
-Taken taken_in(const Selection& selection, std::size_t axis, int first, int count) {
-  const int stride = selection.stride.at(axis);
-  const int before = first - selection.crop.first.at(axis);  // at least 0
-  const int beyond = std::min(before + count, selection.crop.count.at(axis));
-  return {(before + stride - 1) / stride, (beyond + stride - 1) / stride};
-}
-
-// A box of the samples that a selection lies in. Along x its samples are `turned` before those of
-// the crop, which count on beyond the end of the data.
-struct Span {
-  data::Box box;
-  int turned = 0;
-};
-std::vector<Span> spans_of(const scene::Crop& crop) {
-  std::vector<Span> out;
-  const int end = crop.first[0] + crop.count[0];
-  for (int x = crop.first[0]; x < end;) {
-    const int turned = crop.turn > 0 ? x - x % crop.turn : 0;
-    Span span{{crop.first, crop.count}, turned};
-    span.box.first[0] = x - turned;
-    span.box.count[0] = (crop.turn > 0 ? std::min(end, turned + crop.turn) : end) - x;
-    x += span.box.count[0];
-    out.push_back(span);
-  }
-  return out;
-}
-
-// Copies the taken values of a span from a volume whose first sample is `first`; those of columns
-// that the crop does not keep are masked. `to`: all values of the selection.
-void copy_values(const data::Volume& volume, const std::array<int, 3>& first, const Span& span,
-                 const Selection& selection, std::uint8_t* to) {
-  const scene::Crop& crop = selection.crop;
-  const Taken x = taken_in(selection, 0, span.box.first[0] + span.turned, span.box.count[0]);
-  const Taken y = taken_in(selection, 1, span.box.first[1], span.box.count[1]);
-  const Taken z = taken_in(selection, 2, span.box.first[2], span.box.count[2]);
-  std::vector<float> row(static_cast<std::size_t>(std::max(0, x.to - x.from)));
-  if (row.empty()) return;
-  const auto [stride_x, stride_y, stride_z] = selection.stride;
-  const std::ptrdiff_t before = crop.first[0] - span.turned - first[0];
-  for (std::size_t c = 0; c < selection.components; ++c) {
-    for (int k = z.from; k < z.to; ++k) {
-      for (int j = y.from; j < y.to; ++j) {
-        const std::ptrdiff_t layer = crop.first[2] + k * stride_z - first[2];
-        const std::ptrdiff_t line =
-            layer * volume.dims[1] + crop.first[1] + j * stride_y - first[1];
-        const float* const from = volume.component(static_cast<int>(c)) + line * volume.dims[0];
-        const unsigned char* const kept =
-            crop.columns ? crop.columns->data() + std::ptrdiff_t{j} * stride_y * crop.count[0]
-                         : nullptr;
-        for (int i = x.from; i < x.to; ++i) {
-          const std::ptrdiff_t at = std::ptrdiff_t{i} * stride_x;
-          const bool there = kept == nullptr || kept[at] != 0;
-          row[static_cast<std::size_t>(i - x.from)] =
-              there ? from[before + at] : std::numeric_limits<float>::quiet_NaN();
-        }
-        const std::size_t rows =
-            (c * selection.count[2] + static_cast<std::size_t>(k)) * selection.count[1] +
-            static_cast<std::size_t>(j);
-        const std::size_t at = rows * selection.count[0] + static_cast<std::size_t>(x.from);
-        std::memcpy(to + at * sizeof(float), row.data(), row.size() * sizeof(float));
-      }
-    }
-  }
-}
-
-// Whether what a selection takes is read without the rest of the step.
-bool is_read_apart(const Subject& subject, const Selection& selection) {
-  std::vector<data::Box> boxes;
-  for (const Span& span : spans_of(selection.crop)) boxes.push_back(span.box);
-  return subject.dataset->reads_apart(subject.field.name, selection.step, boxes,
-                                      selection.stride[2]);
-}
-
-// Reads it piece by piece.
-Result<void> copy_pieces(const Subject& subject, const Selection& selection, std::uint8_t* to) {
-  constexpr std::size_t piece_values = std::size_t{4} << 20;
-  const std::array<int, 3> dims = subject.dataset->info().grid.dims();
-  for (const Span& span : spans_of(selection.crop)) {
-    const int apart = data::layers_apart(span.box, selection.stride[2], subject.field, dims);
-    for (const data::Box& piece : data::pieces_of(span.box, apart, subject.field, piece_values)) {
-      if (subject.cancel.cancelled()) {
-        return make_error(ErrorKind::cancelled, "request cancelled");
-      }
-      const auto part = load_part(*subject.catalogue, *subject.dataset, subject.field.name,
-                                  selection.step, piece, subject.cancel);
-      if (!part) return part.error();
-      copy_values(**part, piece.first, {piece, span.turned}, selection, to);
-    }
-  }
-  return {};
-}
-
 // Bytes of a response, which count in the memory limit while it is sent.
 struct Held {
   std::vector<std::uint8_t> bytes;
@@ -382,12 +273,8 @@ struct Held {
 
 Result<http::Body> array_of(const Subject& subject, const Selection& selection,
                             const std::vector<std::size_t>& shape) {
-  std::shared_ptr<const data::Volume> whole;
-  if (!is_read_apart(subject, selection)) {
-    auto volume = load(subject, selection.step);
-    if (!volume) return volume.error();
-    whole = std::move(*volume);
-  }
+  const auto whole = whole_for(subject, selection);
+  if (!whole) return whole.error();
   const std::string head = npy_head(shape);
   const std::size_t bytes = head.size() + selection.values() * sizeof(float);
   auto room = subject.catalogue->load(
@@ -398,12 +285,8 @@ Result<http::Body> array_of(const Subject& subject, const Selection& selection,
   held->room = std::move(*room);
   held->bytes.resize(bytes);
   std::memcpy(held->bytes.data(), head.data(), head.size());
-  std::uint8_t* const to = held->bytes.data() + head.size();
-  if (whole) {
-    for (const Span& span : spans_of(selection.crop)) copy_values(*whole, {}, span, selection, to);
-  } else if (auto done = copy_pieces(subject, selection, to); !done) {
-    return done.error();
-  }
+  auto done = copy_selected(*whole, subject, selection, held->bytes.data() + head.size());
+  if (!done) return done.error();
   return http::Body{held, held->bytes};
 }
 
