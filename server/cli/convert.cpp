@@ -124,8 +124,8 @@ Result<void> check_apart(const std::string& input, const std::string& output) {
 
 class Conversion {
  public:
-  Conversion(const ConvertArguments& arguments, CancelToken cancel)
-      : arguments_(arguments), cancel_(std::move(cancel)) {}
+  Conversion(const ConvertArguments& arguments, const CancelToken& cancel)
+      : arguments_(arguments), cancel_(cancel) {}
 
   Result<void> run() {
     const auto limit = memory_limit(arguments_.memory);
@@ -256,6 +256,10 @@ int run_convert(const ConvertArguments& arguments) {
   const bool checks_only = arguments.verify && arguments.output.empty();
   if (arguments.output.empty() && !arguments.verify) {
     complain("-o OUT.zarr is required, unless a store is verified");
+    return exit_usage;
+  }
+  if (arguments.output == "-") {
+    complain("-o: a store is a folder, and is not written to standard output");
     return exit_usage;
   }
   if (!checks_only && arguments.names.size() > 1) {

@@ -203,6 +203,7 @@ OrderedJson root_attributes(const data::DatasetInfo& info, const Plan& plan,
                             const std::vector<std::uint64_t>& bytes, const std::string& contents) {
   const Images images(info, plan);
   OrderedJson out = OrderedJson::object();
+  if (!info.title.empty()) out["title"] = info.title;
   if (plan.format == data::zarr::StoreFormat::v3) {
     out["ome"] = {{"version", "0.5"}, {"multiscales", images.list("")}};
   } else {

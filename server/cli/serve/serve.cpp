@@ -206,6 +206,9 @@ int open_datasets(const std::vector<std::string>& named, bool strict, data::Stor
     if (unfit && !unfit->empty()) {
       log::warn("a dataset can be probed, but its default view is not shown",
                 {{"dataset", info.id}, {"fault", *unfit}});
+    } else if (!beyond.empty() && info.stored) {
+      log::info("full detail exceeds the memory limit: pictures are drawn from stored levels",
+                {{"dataset", info.id}, {"fault", beyond.substr(2)}});
     } else if (!beyond.empty()) {
       log::warn("the memory limit may be too small for a dataset's first view",
                 {{"dataset", info.id}, {"fault", beyond.substr(2)}});

@@ -181,12 +181,15 @@ class Convert(unittest.TestCase):
         self.converted(source)
         told = [json.loads(subprocess.run([PROGRAM, "inspect", "--json", "--ranges", "all", one],
                                           capture_output=True, text=True, check=True).stdout)
-                for one in (source, source.with_suffix(".zarr") / "0")]
-        for what in ("axes", "dims", "steps", "timeUnits"):
-            self.assertEqual(told[0][what], told[1][what])
+                for one in (source, source.with_suffix(".zarr"), source.with_suffix(".zarr") / "0")]
+        self.assertEqual(told[0]["title"], "A storm")
+        for store in told[1:]:
+            for what in ("title", "axes", "dims", "steps", "timeUnits"):
+                self.assertEqual(told[0][what], store[what])
         fields = [{one["name"]: [one[what] for what in ("components", "range", "masked", "units")]
                    for one in text["fields"]} for text in told]
         self.assertEqual(fields[0], fields[1])
+        self.assertEqual(fields[0], fields[2])
 
     def test_inspect_tells_levels_with_their_bricks_and_bytes(self):
         source, _ = write_raw(self.folder, "even", (520, 140, 133), self.rng)
@@ -219,6 +222,9 @@ class Convert(unittest.TestCase):
             self.assertEqual(refused.returncode, 2, refused.stderr)
             self.assertIn(text, refused.stderr)
             self.assertFalse(out.exists())
+        refused = run(source, "-o", "-", check=False)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("a store is a folder", refused.stderr)
         self.converted(source)
         refused = run(source, "-o", out, check=False)
         self.assertEqual(refused.returncode, 1)

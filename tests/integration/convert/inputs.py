@@ -39,6 +39,7 @@ def write_raw(folder, name, sides, rng, across=1):
 def write_pressures(path, shape, rng, steps=2):
     """Uneven pressures, the top and the north first; packed, masked; a wind of two components."""
     with netCDF4.Dataset(path, "w") as file:
+        file.title = "A storm"
         latitudes = np.sin(np.linspace(-1.2, 1.2, shape[1]))[::-1] * 60
         axes = {"time": (np.arange(steps) * 6.0, "hours since 2001-01-01", None),
                 "level": (pressures(shape[0]), "hPa", "air_pressure"),
