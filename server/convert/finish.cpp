@@ -130,6 +130,7 @@ class Finisher {
   Result<void> write_masked(std::size_t array, const std::vector<double>& masked) {
     if (plan_.arrays[array].dtype.kind == 'f') return write_whole(array, masked);
     std::vector<std::uint32_t> counts;
+    counts.reserve(masked.size());
     for (const double count : masked) counts.push_back(static_cast<std::uint32_t>(count));
     return write_whole(array, counts);
   }

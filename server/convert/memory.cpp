@@ -48,7 +48,9 @@ std::size_t open_samples(const Plan& plan, const Level& level) {
           taken *= static_cast<std::size_t>(std::min(end, at.first[a] + at.count[a]) -
                                             std::max(first[a], at.first[a]));
         }
-        std::size_t& left = missing[static_cast<std::size_t>(z * bricks[1] + y)];
+        std::size_t& left =
+            missing[static_cast<std::size_t>(z) * static_cast<std::size_t>(bricks[1]) +
+                    static_cast<std::size_t>(y)];
         if (left == 0) {
           left = there;
           ++open;

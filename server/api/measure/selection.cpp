@@ -61,9 +61,9 @@ void copy_values(const data::Volume& volume, const std::array<int, 3>& first, co
   for (std::size_t c = 0; c < selection.components; ++c) {
     for (int k = z.from; k < z.to; ++k) {
       for (int j = y.from; j < y.to; ++j) {
-        const std::ptrdiff_t layer = crop.first[2] + k * stride_z - first[2];
+        const std::ptrdiff_t layer = crop.first[2] + std::ptrdiff_t{k} * stride_z - first[2];
         const std::ptrdiff_t line =
-            layer * volume.dims[1] + crop.first[1] + j * stride_y - first[1];
+            layer * volume.dims[1] + crop.first[1] + std::ptrdiff_t{j} * stride_y - first[1];
         const float* const from = volume.component(static_cast<int>(c)) + line * volume.dims[0];
         const unsigned char* const kept =
             crop.columns ? crop.columns->data() + std::ptrdiff_t{j} * stride_y * crop.count[0]

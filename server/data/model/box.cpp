@@ -131,7 +131,8 @@ double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
     double samples =
         chunk_at(last, a, field, dims.at(a)).end() - chunk_at(first, a, field, dims.at(a)).first;
     if (a == 2 && layer_stride > chunk) {
-      samples = std::min(samples, ((last - first) / layer_stride + 1) * static_cast<double>(chunk));
+      const int layers = (last - first) / layer_stride + 1;
+      samples = std::min(samples, static_cast<double>(layers) * chunk);
     }
     share *= samples / dims.at(a);
   }

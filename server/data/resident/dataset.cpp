@@ -108,18 +108,18 @@ std::optional<Derivation> Dataset::stored_reduction(const std::string& field,
   const Result<std::size_t> index = state_->find(field, 0);
   if (!index || minus_ || how.halvings == std::array{0, 0, 0}) return std::nullopt;
   Derivation out = reduction(field, how);
-  if (auto level = stored_level(info, *index, how)) {
+  if (const auto level = stored_level(info, *index, how)) {
     out.make = nullptr;
-    out.stored = std::move(level);
+    out.stored = level;
     return out;
   }
   if (how.reduction != Reduction::drawn) return std::nullopt;
-  auto middles = stored_middles(info, *index, how.stride);
+  const auto middles = stored_middles(info, *index, how.stride);
   if (!middles) return std::nullopt;
   Derivation from;
   from.variant = "strided " + std::to_string(how.stride);
   from.bytes = bytes_beside_level(field, how);
-  from.stored = std::move(middles);
+  from.stored = middles;
   out.from = std::make_shared<const Derivation>(std::move(from));
   out.make = [state = state_, how, dims = info.grid.dims()](const Volume& strided) {
     state->add(&Counts::levels);

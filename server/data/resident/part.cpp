@@ -111,9 +111,9 @@ Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, st
   if (auto same = derived::check_same_field(field, info(), minus_->info); !same) {
     return same.error();
   }
-  const auto from = minuend().part(field, step, box);
+  auto from = minuend().part(field, step, box);
   if (!from) return from;
-  const auto minus = other().part(field, minus_step_.value_or(step), box);
+  auto minus = other().part(field, minus_step_.value_or(step), box);
   if (!minus) return minus;
   const auto made = get(key, bytes, [&] {
     return guarded(about, [&]() -> Result<Volume> { return derived::subtract(**from, **minus); });

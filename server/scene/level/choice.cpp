@@ -97,6 +97,7 @@ bool are_within_limit(const std::vector<Shown>& shown, const View& view, const L
 // Whether every sample of all fields fits into memory.
 bool fits_in_full(const std::vector<Shown>& shown, const data::Dataset& dataset) {
   std::vector<std::string> fields;
+  fields.reserve(shown.size());
   for (const Shown& one : shown) fields.push_back(one.field);
   return dataset.fits_in_full(fields);
 }

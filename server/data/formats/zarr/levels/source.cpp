@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -94,7 +95,9 @@ class LevelSource final : public FileSource {
     std::size_t field = 0;
     std::size_t level = 0;
     bool strided = false;
-    auto operator<=>(const Key&) const = default;
+    bool operator<(const Key& other) const {
+      return std::tie(field, level, strided) < std::tie(other.field, other.level, other.strided);
+    }
   };
 
   [[nodiscard]] std::string note_of(const StoredLevels& stored) const {
