@@ -166,13 +166,13 @@ std::vector<protocol::LevelDescription> describe_levels(const data::DatasetInfo&
       level.bricks *=
           static_cast<std::uint64_t>((level.dims.at(a) - 1) / std::max(1, brick.at(a)) + 1);
     }
-    for (std::size_t f = 0; f < info.fields.size(); ++f) {
+    for (std::size_t f = 0; f < info.stored->fields.size(); ++f) {
+      if (!info.stored->fields[f].has_levels) continue;  // as components that are shown alone
       const data::FieldInfo& field = info.fields[f];
       const bool is_vector = field.kind == data::FieldKind::vector;
       const auto as = n == 0      ? data::StoredAs::samples
                       : is_vector ? data::StoredAs::drawn
                                   : data::StoredAs::two_values;
-      if (field.derived || !data::stored_dims(info, f, n, as)) continue;
       level.bytes += samples * static_cast<std::uint64_t>(components_of(field, as)) * sizeof(float);
     }
     if (!info.stored->bytes.empty()) level.stored_bytes = info.stored->bytes.at(n);
