@@ -18,7 +18,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 from inputs import write_pressures, write_raw
 from served import taken_program
 
-PROGRAM = taken_program()
+PROGRAM = pathlib.Path(taken_program()).resolve()  # also from another folder
 
 
 def command(*arguments):
