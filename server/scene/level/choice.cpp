@@ -146,8 +146,11 @@ std::array<int, 3> level_for(const View& view, const Camera& camera, const Latti
   if (!is_drawn_in_full(view)) {
     level = coarser_level(lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)),
                           coarser);
-    const auto shown = shown_at(view, coarsening_of(lattice, level));
-    if (level != full && are_within_limit(shown, view, lattice, dataset)) return level;
+    const auto fits = [&] {
+      return are_within_limit(shown_at(view, coarsening_of(lattice, level)), view, lattice,
+                              dataset);
+    };
+    if (level != full && fits()) return level;
   }
   if (!may_use_stored(view, lattice, dataset)) return full;
   if (fits_in_full(shown_at(view, coarsening_of(lattice, full)), dataset)) return full;
