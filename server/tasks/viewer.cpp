@@ -10,6 +10,7 @@
 #include "server/base/log.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/describe.hpp"
 #include "server/tasks/calibration_job.hpp"
 #include "server/tasks/drawing.hpp"
 #include "server/tasks/error_report.hpp"
@@ -199,6 +200,23 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   }
 }
 
+namespace {
+
+// Of a dataset that a stream can show: not of one whose fields can only be probed. Errors: those of
+// Catalogue::describe(), out_of_memory.
+Result<protocol::DatasetDescription> describe_shown(Catalogue& catalogue, const std::string& id,
+                                                    const CancelToken& cancel) {
+  const auto dataset = catalogue.find(id);
+  if (!dataset) return dataset.error();
+  const auto unfit = scene::why_not_shown(**dataset);
+  if (unfit && !unfit->empty()) {
+    return make_error(ErrorKind::out_of_memory, "dataset " + in_quotes(id) + ": " + *unfit);
+  }
+  return catalogue.describe(id, cancel);
+}
+
+}  // namespace
+
 void Viewer::start(const session::Describe& effect, DescribedReply reply) {
   const auto shared = std::make_shared<const DescribedReply>(std::move(reply));
   if (describing_.use_count() > describing_max) {
@@ -211,7 +229,7 @@ void Viewer::start(const session::Describe& effect, DescribedReply reply) {
        [&backend = backend_, effect, cancel = gone_, shared, one = describing_] {
          (*shared)(effect.id,
                    run_guarded<protocol::DatasetDescription>("a description", cancel, [&] {
-                     return encoded(backend.catalogue.describe(effect.dataset, cancel));
+                     return encoded(describe_shown(backend.catalogue, effect.dataset, cancel));
                    }));
        },
        true, dataset ? (*dataset)->shared_info() : nullptr});
