@@ -12,6 +12,7 @@
 #include "server/engine/layers/chains.hpp"
 #include "server/engine/layers/light.hpp"
 #include "server/engine/layers/line_style.hpp"
+#include "server/engine/positions.hpp"
 
 namespace windsplat::engine {
 
@@ -53,54 +54,8 @@ kernels::Camera make_camera(const Scene& scene) {
   return to;
 }
 
-void add_kernel(const Scene& scene, int a, const AxisKernel& kernel, AxisArrays& axis) {
-  const Camera& camera = scene.camera;
-  axis.sample.push_back(kernel.sample);
-  axis.group.push_back(kernel.group);
-  const double position = scene.lattice.positions[a][kernel.sample];
-  const double from_eye = position - camera.eye[a];
-  axis.position.push_back(position);
-  axis.camera.push_back(from_eye * camera.right[a]);
-  axis.camera.push_back(from_eye * -camera.up[a]);
-  axis.camera.push_back(from_eye * camera.forward[a]);
-  axis.from_eye.push_back(static_cast<float>(from_eye));
-  axis.world.push_back(static_cast<float>(position));
-  axis.cell.push_back(static_cast<float>(kernel.cell));
-  axis.inverse_cell.push_back(1.0F / axis.cell.back());
-}
-
-// A slice has one kernel position along its axis, independent of the stride.
-void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
-  const auto& spacing = scene.lattice.spacing[a];
-  if (scene.slice && scene.slice->axis == a) {
-    const int sample = scene.slice->sample;
-    WINDSPLAT_CHECK(sample >= 0 && sample < scene.lattice.dims[a]);
-    add_kernel(scene, a, {sample, 1, spacing[sample]}, axis);
-    return;
-  }
-  const int samples = scene.lattice.drawn(a);
-  const auto drawn = std::span(spacing).first(static_cast<std::size_t>(samples));
-  for (int first = 0; first < samples; first += stride) {
-    add_kernel(scene, a, axis_kernel(drawn, stride, first), axis);
-  }
-}
-
-void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
-  clear(axis);
-  add_kernels(scene, a, stride, axis);
-  const int count = static_cast<int>(axis.sample.size());
-  visit_order(count, eye_index(scene.camera, a, axis.position), axis.visit);
-  for (int first = 0; first < count;) {
-    const int brick = axis.visit[first] / kernels::brick_side;
-    int last = first;
-    while (last < count && axis.visit[last] / kernels::brick_side == brick) ++last;
-    axis.bricks.push_back({first, last - first});
-    first = last;
-  }
-}
-
 void check_volume(const data::Volume& volume, const Lattice& lattice) {
-  WINDSPLAT_CHECK(volume.dims == lattice.dims);
+  WINDSPLAT_CHECK(volume.dims == lattice.held().count);
   WINDSPLAT_CHECK(volume.values.size() ==
                   volume.samples() * static_cast<std::size_t>(volume.components));
 }
@@ -291,7 +246,7 @@ void place_positions(const Scene& scene, int major, const SampleWays& ways, Pass
   for (int a = 0; a < 3; ++a) {
     AxisArrays& axis = pass.axis[a];
     place_axis(scene, a, pass.stride, axis);
-    to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
+    to.cell_max[a] = widest_cell(scene, a, pass.stride, axis);
   }
   to.around = scene.lattice.around;
   if (scene.lattice.places) bend_pass(scene, ways, pass);
@@ -302,6 +257,7 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
   const trace::Segments* const segments =
       pass.vector != nullptr ? pass.vector->streamlets.get() : nullptr;
   const auto& dims = segments != nullptr ? segments->dims : scene.lattice.dims;
+  const data::Box held = segments != nullptr ? data::whole_box(dims) : scene.lattice.held();
   kernels::Pass& to = pass.kernel;
   if (segments != nullptr) {
     place_chains(*segments, pass);
@@ -309,9 +265,11 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
     place_positions(scene, major, ways, pass);
   }
   to.step[0] = 1;
-  to.step[1] = dims[0];
-  to.step[2] = static_cast<std::int64_t>(dims[0]) * dims[1];
+  to.step[1] = held.count[0];
+  to.step[2] = static_cast<std::int64_t>(held.count[0]) * held.count[1];
+  to.origin = 0;
   for (int a = 0; a < 3; ++a) {
+    to.origin -= to.step[a] * held.first[a];
     const AxisArrays& axis = pass.axis[a];
     to.axis[a] = {static_cast<int>(axis.sample.size()),
                   axis.camera.data(),
@@ -415,40 +373,9 @@ int major_axis(const Camera& camera, const Lattice& lattice) {
   return major;
 }
 
-AxisKernel axis_kernel(std::span<const double> spacing, int stride, int first) {
-  const int last = std::min(first + stride, static_cast<int>(spacing.size())) - 1;
-  const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
-  return {first + (last - first) / 2, last - first + 1, cell};
-}
-
-int eye_index(const Camera& camera, int axis, const std::vector<double>& positions) {
-  const int last = static_cast<int>(positions.size()) - 1;
-  if (!camera.perspective) return camera.forward[axis] >= 0 ? 0 : last;
-  int index = 0;
-  while (index < last && camera.eye[axis] >= 0.5 * (positions[index] + positions[index + 1])) {
-    ++index;
-  }
-  return index;
-}
-
 bool has_thicker_slabs(const Scene& scene) {
   return scene.method == scene::Method::slab && !scene.scalars.empty() &&
          slab_depth_asked(scene) < slab_depth_least(scene);
-}
-
-void visit_order(int count, int eye, std::vector<int>& order) {
-  order.clear();
-  const auto visit_brick = [&](int brick) {
-    const int first = brick * kernels::brick_side;
-    const int last = std::min(first + kernels::brick_side, count) - 1;
-    const int start = std::clamp(eye, first, last);
-    for (int i = start; i <= last; ++i) order.push_back(i);
-    for (int i = start - 1; i >= first; --i) order.push_back(i);
-  };
-  const int bricks = (count + kernels::brick_side - 1) / kernels::brick_side;
-  const int own = eye / kernels::brick_side;
-  for (int brick = own; brick < bricks; ++brick) visit_brick(brick);
-  for (int brick = own - 1; brick >= 0; --brick) visit_brick(brick);
 }
 
 void make_plan(const Scene& scene, RenderPlan& plan) {

@@ -9,7 +9,10 @@
 
 namespace windsplat::frame {
 
-DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene), high_(scene.lattice.dims) {
+DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene) {
+  const data::Box held = scene.lattice.held();
+  low_ = held.first;
+  for (std::size_t a = 0; a < 3; ++a) high_[a] = held.first[a] + held.count[a];
   if (scene.slice) {
     const auto axis = static_cast<std::size_t>(scene.slice->axis);
     low_[axis] = scene.slice->sample;
@@ -18,13 +21,7 @@ DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene), high_(sce
   for (std::size_t a = 0; a < 3; ++a) count_ *= high_[a] - low_[a];
 }
 
-std::size_t DrawnSamples::number(const Index& i) const {
-  const Index& dims = scene_.lattice.dims;
-  return static_cast<std::size_t>(i[0]) +
-         static_cast<std::size_t>(dims[0]) *
-             (static_cast<std::size_t>(i[1]) +
-              static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(i[2]));
-}
+std::size_t DrawnSamples::number(const Index& i) const { return scene_.lattice.number_of(i); }
 
 glm::dvec3 DrawnSamples::place(const Index& i) const {
   const scene::Lattice& lattice = scene_.lattice;

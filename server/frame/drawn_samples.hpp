@@ -58,7 +58,8 @@ class DrawnSamples {
 
   [[nodiscard]] const scene::Scene& scene() const { return scene_; }
   [[nodiscard]] std::int64_t count() const { return count_; }
-  // Indices of the first sample and of the one after the last; those of a slice are its layer.
+  // Indices of the first sample and of the one after the last; those of a slice are its layer, of a
+  // part those that it holds.
   [[nodiscard]] const Index& low() const { return low_; }
   [[nodiscard]] const Index& high() const { return high_; }
   [[nodiscard]] bool contains(const Index& i) const;
@@ -79,7 +80,7 @@ class DrawnSamples {
  private:
   const scene::Scene& scene_;
   Index low_{0, 0, 0};
-  Index high_;
+  Index high_{0, 0, 0};
   std::int64_t count_ = 1;
 };
 

@@ -27,7 +27,7 @@ constexpr std::size_t channels = 4;
 
 double samples_of(const scene::Lattice& lattice) {
   double samples = 1;
-  for (const int n : lattice.dims) samples *= n;
+  for (const int n : lattice.held().count) samples *= n;
   return samples;
 }
 

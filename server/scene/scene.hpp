@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "server/data/model/box.hpp"
 #include "server/data/model/volume.hpp"
 #include "server/ground/paint.hpp"
 #include "server/surface/shown.hpp"
@@ -63,9 +64,27 @@ struct Lattice {
   // Samples along x after which the data repeat, where the lattice is part of them and may go on
   // beyond their end; 0: it does not.
   int turn = 0;
+  // The samples of which fields hold values, where these are a part of the lattice
+  // (scene/parts.hpp): whatever is drawn elsewhere lies beyond the picture. Everything else
+  // describes the whole lattice, so that a picture does not depend on the part. nullopt: all.
+  std::optional<data::Box> part;
+  [[nodiscard]] data::Box held() const { return part ? *part : data::whole_box(dims); }
+  // Number of a sample in the fields, x fastest.
+  [[nodiscard]] std::size_t number_of(const std::array<int, 3>& sample) const;
   // Number of samples along an axis that are drawn, unless it is that of a slice.
   [[nodiscard]] int drawn(int axis) const { return axis == 0 && around > 0 ? around : dims[axis]; }
 };
+
+inline std::size_t Lattice::number_of(const std::array<int, 3>& sample) const {
+  const std::array<int, 3>& count = part ? part->count : dims;
+  std::size_t number = 0;
+  for (std::size_t a = 3; a-- > 0;) {
+    const int first_held = part ? part->first[a] : 0;
+    number = number * static_cast<std::size_t>(count[a]) +
+             static_cast<std::size_t>(sample[a] - first_held);
+  }
+  return number;
+}
 
 // World heights of the edges of the lowest and the highest cell.
 std::array<double, 2> height_range(const Lattice& lattice);
@@ -255,6 +274,8 @@ struct Scene {
   Camera camera;
   Lattice lattice;                    // lattice of the drawn level
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
+  // Of data with stored levels, the level that suffices for the picture.
+  std::optional<std::array<int, 3>> wanted_level;
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
   std::optional<Light> light;

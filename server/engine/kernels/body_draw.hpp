@@ -396,7 +396,8 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& u = pass.axis[pass.u];
   const Axis& v = pass.axis[pass.v];
   const Axis& major = pass.axis[pass.major];
-  const std::int64_t sheet = pass.step[pass.major] * major.sample[major.visit[brick.sheet]];
+  const std::int64_t sheet =
+      pass.origin + pass.step[pass.major] * major.sample[major.visit[brick.sheet]];
   const std::int64_t first = sheet + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
   for (int j = 0; j < brick.v_count; ++j) {
     const std::int64_t at = first + pass.step[pass.v] * v.sample[v.visit[brick.v_first + j]];

@@ -106,7 +106,7 @@ void set_pair(const Pass& pass, int pair, Rows& rows) {
   fill_row<0>(pass, pass.v, rows.first[pass.v] + 2 * pair, rows);
   fill_row<brick_side>(pass, pass.v, rows.first[pass.v] + second, rows);
   rows.there = second - 2 * pair + 1;
-  rows.offset[0] = rows.offset[1] = 0;
+  rows.offset[0] = rows.offset[1] = pass.origin;
   for (int a = 0; a < 3; ++a) {
     rows.offset[0] += pass.step[a] * rows.sample[a][0];
     rows.offset[1] += pass.step[a] * rows.sample[a][brick_side];

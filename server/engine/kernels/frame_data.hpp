@@ -201,13 +201,14 @@ struct Pass {
   Axis axis[3];
   int major, u, v;       // sheets are stacked along major; u is innermost
   std::int64_t step[3];  // offset between neighbours along each axis, in samples
+  std::int64_t origin;   // offset of sample 0 in the fields: not above 0, as they may be of a part
   int has_lines;
   int has_medium;
   LineStyle line;
   Medium medium;
   Sunlight light;
   float cell_max[3];    // widest cell along each axis; curved: largest extent of a cell
-  int dims[3];          // dimensions of the fields
+  int dims[3];          // dimensions of the lattice
   int around;           // scene::Lattice::around
   const float* places;  // curved lattices: 3 per sample, world units; otherwise null
   int compositing;      // scene::Compositing or compositing_or

@@ -14,15 +14,8 @@ using scene::Scene;
 
 Vec to_vec(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
-std::size_t sample_index(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
-  const auto x = static_cast<std::size_t>(lattice.dims[0]);
-  const auto y = static_cast<std::size_t>(lattice.dims[1]);
-  return static_cast<std::size_t>(sample[0]) +
-         x * (static_cast<std::size_t>(sample[1]) + y * static_cast<std::size_t>(sample[2]));
-}
-
 Vec position_of(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
-  const auto& at = (*lattice.places)[sample_index(lattice, sample)];
+  const auto& at = (*lattice.places)[lattice.number_of(sample)];
   return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
 }
 
@@ -117,9 +110,11 @@ std::vector<AxisPosition> axis_positions(const Scene& scene, int axis, int strid
     const int sample = scene.slice->sample;
     return {{sample, 1, spacing[sample]}};
   }
+  const data::Box held = scene.lattice.held();
   const int dim = scene.lattice.drawn(axis);
+  const int end = std::min(dim, held.first[axis] + held.count[axis]);
   std::vector<AxisPosition> positions;
-  for (int done = 0; done < dim;) {
+  for (int done = held.first[axis]; done < end;) {
     const int samples = std::min(stride, dim - done);
     AxisPosition position{done + (samples - 1) / 2, samples, 0};
     for (int n = 0; n < samples; ++n) position.cell += spacing[done++];
@@ -152,7 +147,7 @@ KernelPosition make_kernel_position(const Scene& scene, const View& view,
     position.cell[a] = positions[a].cell;
     world[a] = scene.lattice.positions[a][positions[a].sample];
   }
-  position.index = sample_index(scene.lattice, position.sample);
+  position.index = scene.lattice.number_of(position.sample);
   if (scene.lattice.places) {
     world = position_of(scene.lattice, position.sample);
     position.edge = curved_edges(scene.lattice, positions);

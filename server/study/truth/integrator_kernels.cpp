@@ -52,8 +52,9 @@ std::vector<Position> positions(const Scene& scene, int axis, int stride) {
     return {{scene.slice->sample, 1, spacing[scene.slice->sample]}};
   }
   std::vector<Position> out;
-  const int count = scene.lattice.drawn(axis);
-  for (int first = 0; first < count; first += stride) {
+  const data::Box held = scene.lattice.held();
+  const int count = std::min(scene.lattice.drawn(axis), held.first[axis] + held.count[axis]);
+  for (int first = held.first[axis]; first < count; first += stride) {
     const int samples = std::min(stride, count - first);
     Position position{first + (samples - 1) / 2, samples, 0};
     for (int i = first; i < first + samples; ++i) position.width += spacing[i];
@@ -62,14 +63,9 @@ std::vector<Position> positions(const Scene& scene, int axis, int stride) {
   return out;
 }
 
-std::size_t index_of(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
-  const std::size_t row = static_cast<std::size_t>(lattice.dims[0]);
-  return sample[0] + row * (sample[1] + static_cast<std::size_t>(lattice.dims[1]) * sample[2]);
-}
-
 Vec place(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
   if (lattice.places) {
-    const auto& at = (*lattice.places)[index_of(lattice, sample)];
+    const auto& at = (*lattice.places)[lattice.number_of(sample)];
     return {at[0], at[1], at[2]};
   }
   return {lattice.positions[0][sample[0]], lattice.positions[1][sample[1]],
@@ -103,7 +99,7 @@ void each_cell(const Scene& scene, int stride, const Visit& visit) {
       for (const Position& x : positions(scene, 0, stride)) {
         Cell cell;
         cell.sample = {x.sample, y.sample, z.sample};
-        cell.index = index_of(scene.lattice, cell.sample);
+        cell.index = scene.lattice.number_of(cell.sample);
         cell.centre = place(scene.lattice, cell.sample);
         cell.width = {x.width, y.width, z.width};
         const std::array<Position, 3> along{x, y, z};
