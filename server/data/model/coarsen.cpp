@@ -298,8 +298,11 @@ class Drawer {
         first_(how.first),
         data_dims_(data_dims) {
     for (std::size_t a = 0; a < 3; ++a) {
-      WINDSPLAT_CHECK(apart == 1 || fine.dims[a] == (data_dims_[a] + apart - 1) / apart);
-      coarse_.dims[a] = halved(apart == 1 ? fine.dims[a] : data_dims_[a], halvings_[a]);
+      WINDSPLAT_CHECK(first_[a] % apart == 0);
+      const int samples = std::min(fine.dims[a] * apart, data_dims_[a] - first_[a]);
+      WINDSPLAT_CHECK(samples > (fine.dims[a] - 1) * apart);
+      WINDSPLAT_CHECK(first_[a] + samples == data_dims_[a] || samples % (1 << halvings_[a]) == 0);
+      coarse_.dims[a] = halved(samples, halvings_[a]);
     }
     coarse_.components = fine.components;
     coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(fine.components));
@@ -340,8 +343,8 @@ class Drawer {
       const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], data_dims_[a]);
       const auto sample = drawn_sample(along, halvings_[a], stride_, data_dims_[a], hash[a]);
       if (!sample) return std::nullopt;
-      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample / static_cast<unsigned>(apart_) -
-           static_cast<std::size_t>(first_[a]);
+      at = at * static_cast<std::size_t>(fine_.dims[a]) +
+           (*sample - static_cast<std::size_t>(first_[a])) / static_cast<unsigned>(apart_);
     }
     return at;
   }

@@ -65,8 +65,8 @@ int halved(int samples, int halvings);
 // samples.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
-// What coarsen() draws of data of those dimensions with the stride of `how`, from the samples of
-// all strided kernels alone (strided_sample()), in the order of the kernels.
+// What coarsen() draws of data of those dimensions, or of a box of them that begins at a multiple
+// of the stride of `how`, from the samples of the strided kernels in it alone (strided_sample()).
 Volume draw(const Volume& strided, const Coarsening& how, const std::array<int, 3>& data_dims);
 
 // Components of the reduction of a field with `components`.
