@@ -75,8 +75,7 @@ VisiblePart visible_part(const scene::Camera& camera, const scene::Lattice& latt
 
 class Counting {
  public:
-  Counting(const scene::ViewOutline& outline, const std::array<int, 3>& level,
-           const data::Grid& grid)
+  Counting(const scene::ViewOutline& outline, const scene::DrawnPart& part, const data::Grid& grid)
       : view_(outline.view),
         lattice_(outline.lattice),
         is_of_earth_(grid.columns || (grid.axes[0].kind == data::AxisKind::longitude &&
@@ -84,7 +83,8 @@ class Counting {
         bent_(outline.bent),
         visible_(visible_part(outline.camera, lattice_)),
         pixels_(static_cast<double>(outline.camera.width) * outline.camera.height),
-        values_(level == std::array{0, 0, 0} ? 1 : 2) {
+        values_(part.halvings == std::array{0, 0, 0} ? 1 : 2) {
+    for (std::size_t a = 0; a < 3; ++a) data_[a] = lattice_.dims[a];
     if (protocol::is_section(view_.geometry)) {
       if (const auto section = scene::make_section(view_.geometry, lattice_)) {
         for (std::size_t a = 0; a < 3; ++a) samples_[a] = section->dims[a];
@@ -95,9 +95,11 @@ class Counting {
     const auto slice = scene::slice_of(view_.geometry, lattice_);
     for (std::size_t a = 0; a < 3; ++a) {
       const bool one = slice && slice->axis == static_cast<int>(a);
-      samples_[a] = one ? 1.0 : data::halved(lattice_.dims[a], level[a]);
-      cell_[a] = scene::cell_size(lattice_, a) * std::exp2(level[a]);
+      samples_[a] = one ? 1.0 : data::halved(lattice_.dims[a], part.halvings[a]);
+      cell_[a] = scene::cell_size(lattice_, a) * std::exp2(part.halvings[a]);
+      if (part.box) hold_part(a, part);
     }
+    visible_.share = std::min(visible_.share, 1.0);
   }
 
   Cost count() {
@@ -135,6 +137,14 @@ class Counting {
   }
 
  private:
+  // Of a part a larger share is visible.
+  void hold_part(std::size_t a, const scene::DrawnPart& part) {
+    const double whole = samples_[a];
+    samples_[a] = part.box->count[a];
+    data_[a] = std::min<double>(data_[a], std::ldexp(samples_[a], part.halvings[a]));
+    visible_.share *= whole / samples_[a];
+  }
+
   [[nodiscard]] bool may_show_ground() const {
     if (view_.ground.show == protocol::GroundShow::off) return false;
     return view_.ground.show == protocol::GroundShow::on || is_of_earth_ ||
@@ -158,7 +168,7 @@ class Counting {
   [[nodiscard]] double lines(int stride) const {
     double count = 1;
     for (std::size_t a = 0; a < 3; ++a) {
-      count *= std::min(samples_[a], std::ceil(static_cast<double>(lattice_.dims[a]) / stride));
+      count *= std::min(samples_[a], std::ceil(data_[a] / stride));
     }
     return count;
   }
@@ -235,10 +245,11 @@ class Counting {
   const scene::Lattice& lattice_;
   const bool is_of_earth_;
   const bool bent_;
-  const VisiblePart visible_;
+  VisiblePart visible_;
   const double pixels_;
-  const double values_;  // of a medium at each sample
-  std::array<double, 3> samples_{};
+  const double values_;              // of a medium at each sample
+  std::array<double, 3> samples_{};  // drawn, of the level
+  std::array<double, 3> data_{};     // of the data that these represent
   std::array<double, 3> cell_{};
   Cost cost_;
   double most_ = -1;
@@ -247,7 +258,7 @@ class Counting {
 }  // namespace
 
 Cost cost_of(const scene::ViewOutline& outline, const data::Dataset& dataset) {
-  return Counting(outline, scene::level_of(outline, dataset), dataset.info().grid).count();
+  return Counting(outline, scene::part_of(outline, dataset), dataset.info().grid).count();
 }
 
 }  // namespace windsplat::frame

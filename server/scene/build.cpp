@@ -116,7 +116,8 @@ struct Fields {
   const data::Dataset& dataset;
   const CompletedView& completed;
   data::Coarsening coarsening;
-  const Section* section;  // null: the samples of the data
+  std::optional<data::Box> box;  // of samples of the level; nullopt: all
+  const Section* section;        // null: the samples of the data
   [[nodiscard]] Needed of_medium(const std::string& name) const {
     return find(name, coarsening, kept_of(name, protocol::FilterOf::media));
   }
@@ -136,6 +137,7 @@ struct Fields {
   }
   [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how,
                             const data::Derivation& kept) const {
+    if (box) return {name, part_of_field(dataset, name, how, *box).value()};
     if (section == nullptr) {
       // What a region keeps is not what is stored.
       auto stored = kept.variant.empty() ? dataset.stored_reduction(name, how) : std::nullopt;
@@ -239,7 +241,7 @@ NeededMedium needed_medium(const protocol::ScalarView& from, const Fields& field
   return {std::move(layer), fields.of_medium(from.field)};
 }
 
-Result<NeededScene> needed_scene(const CompletedView& completed, const std::array<int, 3>& level,
+Result<NeededScene> needed_scene(const CompletedView& completed, const DrawnPart& part,
                                  const data::Dataset& dataset) {
   const View& view = completed.view();
   const std::shared_ptr<const Placed>& placed = completed.placed();
@@ -250,7 +252,7 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const std::arra
     section->owner = placed;
     needed.section = std::move(*section);
   }
-  const Fields fields{dataset, completed, coarsening_of(placed->lattice, level),
+  const Fields fields{dataset, completed, coarsening_of(placed->lattice, part.halvings), part.box,
                       needed.section ? &*needed.section : nullptr};
   if (shows_lines(view)) {
     auto lines = needed_lines(view, *placed, fields);
@@ -298,7 +300,9 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
     media.push_back(values.field + '\n' + std::to_string(step) + '\n' + values.how.variant);
   }
   if (!needed.section) {
+    const auto box = scene.lattice.part;
     scene.lattice = coarsen_lattice(whole, scene.level);
+    scene.lattice.part = box;
     if (auto lit = light::light_scene(completed.view(), media, dataset, scene); !lit) {
       return lit.error();
     }
@@ -331,8 +335,11 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  scene.level = level_of(completed, dataset);
-  auto needed = needed_scene(completed, scene.level, dataset);
+  const DrawnPart part = part_of(completed, dataset);
+  scene.level = part.halvings;
+  scene.lattice.part = part.box;
+  if (dataset.info().stored != nullptr) scene.wanted_level = part.wanted;
+  auto needed = needed_scene(completed, part, dataset);
   if (!needed) return needed.error();
   auto body = make_body(view, scene.camera, *completed.placed(), dataset);
   if (!body) return body.error();
@@ -351,7 +358,7 @@ double detail_shown(const CompletedView& completed) {
 }
 
 Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& dataset) {
-  auto needed = needed_scene(completed, level_of(completed, dataset), dataset);
+  auto needed = needed_scene(completed, part_of(completed, dataset), dataset);
   if (!needed) return needed.error();
   Needs needs;
   if (needed->lines) {

@@ -8,6 +8,7 @@
 #include "server/base/error.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/parts.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {
@@ -21,11 +22,12 @@ Result<Scene> build_scene(const protocol::View& view, data::Dataset& dataset);
 // below 1, not every sample is drawn. 0 if every sample is always drawn.
 double detail_shown(const CompletedView& completed);
 
-// Number of halvings of each axis of the data for this picture: none if the levels do not fit into
-// the memory limit of the dataset.
-std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset);
-std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset);
-// The same for a picture of another height, in pixels, of the view without additional halvings.
+// What of the data this picture is drawn from: every sample if levels do not fit into the memory
+// limit of the dataset.
+DrawnPart part_of(const CompletedView& completed, const data::Dataset& dataset);
+DrawnPart part_of(const ViewOutline& outline, const data::Dataset& dataset);
+// Number of halvings of each axis of the data for a picture of another height, in pixels, of the
+// view without additional halvings.
 std::array<int, 3> level_at(const CompletedView& completed, int height,
                             const data::Dataset& dataset);
 

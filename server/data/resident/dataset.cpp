@@ -162,6 +162,15 @@ bool Dataset::fits_in_full(const std::vector<std::string>& fields) const {
          state_->budget->bytes_max();
 }
 
+bool Dataset::fits_beside_boxes(std::uint64_t bytes, const std::vector<std::string>& fields) const {
+  std::uint64_t reading = 0;
+  for (const std::string& field : fields) {
+    const FieldInfo* const about = state_->info.find(field);
+    if (about != nullptr) reading = std::max(reading, reading_box_bytes(*about));
+  }
+  return bytes + state_->bytes_beside(reading) <= state_->budget->bytes_max();
+}
+
 Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
                                    const Derivation& how) {
   if (how.variant.empty()) return volume(field, step);

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "server/base/check.hpp"
+#include "server/scene/lines/reach.hpp"
 
 namespace windsplat::engine {
 
@@ -22,27 +23,6 @@ double magnitude_scale(const scene::VectorLayer& from) {
   return trace::Segments::scale_of(from.magnitude_range[1]);
 }
 
-// The width of the box of one kernel at full detail in cells of the level, at most; at least 1.
-double widest_box(const scene::VectorLayer& from, std::size_t a) {
-  const auto& boxes = from.group_box[a];
-  if (!boxes.empty()) {
-    return std::max(1.0, static_cast<double>(*std::max_element(boxes.begin(), boxes.end())));
-  }
-  const int group = 1 << from.halvings[a];
-  const int rest = from.data_dims[a] % group;
-  const int least = rest == 0 ? group : rest;  // samples of the smallest group
-  return std::max(1.0, static_cast<double>(from.data_stride) / least);
-}
-
-// From the position of a cell of the level to that of a sample in it, in cells, at most.
-double farthest_place(const scene::VectorLayer& from, std::size_t a) {
-  double most = 0.5;
-  for (const float place : from.group_place[a]) {
-    most = std::max(most, std::abs(static_cast<double>(place)));
-  }
-  return most;
-}
-
 void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {
   to.merged = from.halvings == std::array{0, 0, 0} ? 0 : 1;
   to.data_stride = from.data_stride;
@@ -56,10 +36,11 @@ void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {
     const bool uneven = !from.group_box[a].empty();
     to.group_place[a] = uneven ? from.group_place[a].data() : nullptr;
     to.group_box[a] = uneven ? from.group_box[a].data() : nullptr;
-    const double box = to.merged != 0 ? widest_box(from, a) : 1;
+    const double box = to.merged != 0 ? scene::widest_box(from, a) : 1;
     to.half_box[a] = static_cast<float>(box) * to.half_span;
     const double jitter = 0.5 * (from.jitter_center + from.jitter_stride) * box;
-    to.shift[a] = static_cast<float>(to.merged != 0 ? farthest_place(from, a) + jitter : jitter);
+    to.shift[a] =
+        static_cast<float>(to.merged != 0 ? scene::farthest_place(from, a) + jitter : jitter);
   }
 }
 

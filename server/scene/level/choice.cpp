@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -11,6 +13,7 @@
 #include "server/data/model/stored.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/lines/mark.hpp"
+#include "server/scene/parts.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
 
@@ -50,14 +53,8 @@ MergeLimits merge_limits(const View& view) {
 
 namespace {
 
-// A field and how it is reduced.
-struct Shown {
-  std::string field;
-  data::Coarsening coarsening;
-};
-
-std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
-  std::vector<Shown> shown;
+std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) {
+  std::vector<ShownField> shown;
   if (shows_lines(view)) {
     shown.push_back({view.vector.field.name, drawn(how, view)});
     if (view.vector.color.by == protocol::ColorBy::scalar) {
@@ -75,8 +72,8 @@ bool keeps_part(const View& view) { return is_cropped(view.region) || !view.regi
 // Whether the levels of all fields fit into memory beside the largest volume from which one is
 // reduced, and what a region keeps of it; a stored level is not reduced. It depends on sizes alone,
 // so that a view has the same level whatever is resident.
-bool are_within_limit(const std::vector<Shown>& shown, const View& view, const Lattice& lattice,
-                      const data::Dataset& dataset) {
+bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
+                      const Lattice& lattice, const data::Dataset& dataset) {
   const bool kept = keeps_part(view);
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
@@ -95,91 +92,123 @@ bool are_within_limit(const std::vector<Shown>& shown, const View& view, const L
 }
 
 // Whether every sample of all fields fits into memory.
-bool fits_in_full(const std::vector<Shown>& shown, const data::Dataset& dataset) {
+bool fits_in_full(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
   std::vector<std::string> fields;
   fields.reserve(shown.size());
-  for (const Shown& one : shown) fields.push_back(one.field);
+  for (const ShownField& one : shown) fields.push_back(one.field);
   return dataset.fits_in_full(fields);
 }
 
-// Whether the view can be drawn from stored levels in place of every sample: not what asks for
-// these, shows them themselves, as slices and streamlets do, or a part of them. The reference draws
-// no merged samples.
+// Whether the view can be drawn from what is stored of a part of the samples, or of merged ones:
+// not what shows the samples of the whole themselves, as slices and streamlets do, or what a region
+// keeps of them.
 bool may_use_stored(const View& view, const Lattice& lattice, const data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
+  const bool traced = shows_lines(view) && protocol::has_streamlets(view);
+  return info.stored != nullptr && !dataset.subtrahend() && !lattice.places &&
+         lattice.dims == info.grid.dims() && !view.geometry.slice && !view.geometry.plane &&
+         !traced && !keeps_part(view);
+}
+
+// Whether merged samples may be drawn in place of those of the data. The reference draws none, and
+// strided media do not.
+bool may_merge(const View& view) {
   const auto& media = *view.scalars;
   const bool strided = std::any_of(media.begin(), media.end(),
                                    [](const protocol::ScalarView& of) { return of.stride > 1; });
-  const bool traced = shows_lines(view) && protocol::has_streamlets(view);
-  const bool wants_all = view.method.detail == protocol::Detail::full ||
-                         view.method.name == protocol::MethodName::reference;
-  return !wants_all && info.stored != nullptr && !dataset.subtrahend() && !lattice.places &&
-         lattice.dims == info.grid.dims() && !view.geometry.slice && !view.geometry.plane &&
-         !strided && !traced && !keeps_part(view);
+  return view.method.detail != protocol::Detail::full &&
+         view.method.name != protocol::MethodName::reference && !strided;
 }
 
-// The coarsest stored level of which no axis is halved more often than in `level`, or the first
-// coarser one that fits into memory; the coarsest of all if none does.
-std::array<int, 3> stored_level_for(const View& view, const Lattice& lattice,
-                                    const std::array<int, 3>& level, const data::Dataset& dataset) {
-  const auto& levels = dataset.info().stored->levels;
-  std::size_t n = 0;
-  const auto is_allowed = [&](const std::array<int, 3>& stored) {
-    return stored[0] <= level[0] && stored[1] <= level[1] && stored[2] <= level[2];
-  };
-  while (n + 1 < levels.size() && is_allowed(levels[n + 1])) ++n;
-  for (n = std::max<std::size_t>(n, 1); n < levels.size(); ++n) {
-    const auto shown = shown_at(view, coarsening_of(lattice, levels[n]));
-    if (are_within_limit(shown, view, lattice, dataset)) return levels[n];
-  }
-  return levels.back();
-}
+// What of the data a view is drawn from.
+class Choice {
+ public:
+  Choice(const View& view, const Camera& camera, const Lattice& lattice,
+         const data::Dataset& dataset)
+      : view_(view), camera_(camera), lattice_(lattice), dataset_(dataset) {}
 
-// The fraction of the requested detail that the picture can show. If there is memory for the
-// volumes but not for their levels, every sample is drawn; if there is not, a coarser stored level.
-// The report of the frame says so.
-std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
-                             int coarser, const data::Dataset& dataset) {
-  constexpr std::array full{0, 0, 0};
-  const auto slice = slice_of(view.geometry, lattice);
-  std::array<int, 3> level = full;
-  if (!is_drawn_in_full(view)) {
-    level = coarser_level(lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)),
-                          coarser);
-    const auto fits = [&] {
-      return are_within_limit(shown_at(view, coarsening_of(lattice, level)), view, lattice,
-                              dataset);
-    };
-    if (level != full && fits()) return level;
-  }
-  if (!may_use_stored(view, lattice, dataset)) return full;
-  if (fits_in_full(shown_at(view, coarsening_of(lattice, full)), dataset)) return full;
-  if (is_drawn_in_full(view) && has_strided_lines(view)) {
-    // At these levels the lines are the same.
-    while (2 << level[0] <= *view.vector.stride) {
-      for (int& h : level) ++h;
+  // The fraction of the requested detail that the picture can show. If there is memory for the
+  // volumes but not for their levels, every sample is drawn; if there is not, what is in sight, or
+  // a coarser stored level. The report of the frame says so.
+  [[nodiscard]] DrawnPart part(int coarser) const {
+    constexpr std::array full{0, 0, 0};
+    std::array<int, 3> level = full;
+    if (!is_drawn_in_full(view_)) {
+      const auto slice = slice_of(view_.geometry, lattice_);
+      level = choose_level(camera_, lattice_, slice, merge_limits(view_));
+      level = coarser_level(lattice_, slice, level, coarser);
+      if (level != full && fits(level)) return {level, std::nullopt, level};
     }
+    const DrawnPart all{full, std::nullopt, level};
+    if (!may_use_stored(view_, lattice_, dataset_)) return all;
+    if (fits_in_full(shown_at(view_, coarsening_of(lattice_, full)), dataset_)) return all;
+    if (!may_merge(view_)) return {full, box(full), full};
+    if (is_drawn_in_full(view_) && has_strided_lines(view_)) {
+      // At these levels the lines are the same.
+      while (2 << level[0] <= *view_.vector.stride) {
+        for (int& h : level) ++h;
+      }
+    }
+    return stored(level);
   }
-  return stored_level_for(view, lattice, level, dataset);
-}
+
+ private:
+  [[nodiscard]] bool fits(const std::array<int, 3>& level) const {
+    const auto shown = shown_at(view_, coarsening_of(lattice_, level));
+    return are_within_limit(shown, view_, lattice_, dataset_);
+  }
+
+  [[nodiscard]] std::optional<data::Box> box(const std::array<int, 3>& level) const {
+    if (!may_use_part(view_)) return std::nullopt;
+    const auto shown = shown_at(view_, coarsening_of(lattice_, level));
+    return box_for(view_, camera_, lattice_, level, shown, dataset_);
+  }
+
+  // The coarsest stored level of which no axis is halved more often than in `level`, or the first
+  // coarser one of which the whole, or what is in sight, fits into memory; the coarsest of all if
+  // none does. The whole of level 0 does not.
+  [[nodiscard]] DrawnPart stored(const std::array<int, 3>& level) const {
+    const auto& levels = dataset_.info().stored->levels;
+    const auto is_allowed = [&](const std::array<int, 3>& one) {
+      return one[0] <= level[0] && one[1] <= level[1] && one[2] <= level[2];
+    };
+    std::size_t n = 0;
+    while (n + 1 < levels.size() && is_allowed(levels[n + 1])) ++n;
+    const std::array<int, 3> wanted = levels[n];
+    for (; n < levels.size(); ++n) {
+      if (n > 0 && fits(levels[n])) return {levels[n], std::nullopt, wanted};
+      if (auto of_level = box(levels[n])) return {levels[n], of_level, wanted};
+    }
+    // Lines that are not stored at coarser levels.
+    if (auto of_samples = box(levels.front())) return {levels.front(), of_samples, wanted};
+    return {levels.back(), std::nullopt, wanted};
+  }
+
+  const View& view_;
+  const Camera& camera_;
+  const Lattice& lattice_;
+  const data::Dataset& dataset_;
+};
 
 }  // namespace
 
-std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset) {
-  return level_for(completed.view(), completed.camera(), completed.lattice(), completed.coarser(),
-                   dataset);
+DrawnPart part_of(const CompletedView& completed, const data::Dataset& dataset) {
+  return Choice(completed.view(), completed.camera(), completed.lattice(), dataset)
+      .part(completed.coarser());
 }
 
-std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset) {
-  if (outline.bent) return {0, 0, 0};
-  return level_for(outline.view, outline.camera, outline.lattice, 0, dataset);
+DrawnPart part_of(const ViewOutline& outline, const data::Dataset& dataset) {
+  if (outline.bent) return {};
+  return Choice(outline.view, outline.camera, outline.lattice, dataset).part(0);
 }
 
 std::array<int, 3> level_at(const CompletedView& completed, int height,
                             const data::Dataset& dataset) {
   Camera camera = completed.camera();
+  const double aspect = static_cast<double>(camera.width) / camera.height;
   camera.height = height;
-  return level_for(completed.view(), camera, completed.lattice(), 0, dataset);
+  camera.width = std::max(1, static_cast<int>(std::lround(aspect * height)));
+  return Choice(completed.view(), camera, completed.lattice(), dataset).part(0).halvings;
 }
 
 }  // namespace windsplat::scene

@@ -1,5 +1,5 @@
-// Which level of the data a view is drawn at (level_of() in scene/build.hpp): chosen by the sizes
-// of cells in the picture, by memory, and by what is stored.
+// Which level of the data a view is drawn at, and which part of it (part_of() in scene/build.hpp):
+// chosen by the sizes of cells in the picture, by memory, and by what is stored.
 #pragma once
 
 #include <cstddef>

@@ -1,0 +1,323 @@
+#include "server/scene/parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "protocol/view/shown.hpp"
+#include "server/data/model/stored.hpp"
+#include "server/data/resident/budget.hpp"
+#include "server/scene/detail.hpp"
+#include "server/scene/lines/mark.hpp"
+#include "server/scene/lines/reach.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using protocol::absorbs;
+using protocol::shows_lines;
+using protocol::View;
+
+constexpr int brick_kernels = 8;  // along an axis: of the bricks that the engine culls
+constexpr std::array full{0, 0, 0};
+// Of the memory limit: the parts before and after a change of the camera exist at the same time.
+constexpr double part_share_max = 0.45;
+
+int halved_stride(const View& view, int halvings) {
+  const int stride = view.vector.stride.value_or(1);
+  return stride / std::gcd(stride, 1 << halvings);
+}
+
+// The lines of a view as far as their extent depends on it.
+VectorLayer lines_of(const View& view, const Camera& camera, const Lattice& whole,
+                     const std::array<int, 3>& halvings) {
+  const protocol::VectorView& from = view.vector;
+  VectorLayer layer;
+  layer.length = from.length.value();
+  layer.span = from.span;
+  layer.stride = from.stride.value();
+  layer.jitter_center = from.jitter.center;
+  layer.jitter_stride = from.jitter.stride;
+  layer.overlap = from.jitter.overlap;
+  set_radii(from, view.image.height, layer);
+  layer.mark = mark_of(from, view.image.height);
+  merge_lines(whole, halvings, pixels_per_unit(camera, whole), layer);
+  return layer;
+}
+
+// How far kernels reach beyond their positions.
+struct Reach {
+  std::array<double, 3> world{};
+  double pixels = 0;  // in addition
+};
+
+// Bounds that the engine's culling does not exceed (kernel_reach in engine/bins, Projector).
+Reach reach_of(const View& view, const Camera& camera, const Lattice& whole,
+               const std::array<int, 3>& halvings, const Lattice& level) {
+  constexpr double rounding = 1.001;
+  constexpr double footprint_radius = 1.37;  // cells
+  constexpr double pixels_beside = 1.5;
+  std::array<double, 3> cells{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    cells[a] = *std::max_element(level.spacing[a].begin(), level.spacing[a].end());
+  }
+  Reach out;
+  out.pixels = pixels_beside;
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (!absorbs(scalar)) continue;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double splat = footprint_radius * cells[a] * scalar.stride;
+      out.world[a] = std::max(out.world[a], rounding * splat);
+    }
+  }
+  if (!shows_lines(view)) return out;
+  const VectorLayer lines = lines_of(view, camera, whole, halvings);
+  std::array<double, 3> strided = cells;
+  for (double& cell : strided) cell *= lines.stride;
+  const auto reach = line_reach(lines, strided);
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.world[a] = std::max(out.world[a], rounding * reach[a]);
+  }
+  out.pixels += rounding * outer_radius(lines);
+  return out;
+}
+
+// Boxes of units along each axis: the first, and the one after the last.
+using Units = std::array<std::array<int, 2>, 3>;
+
+// Finds the bounds of the units of samples in sight, dividing boxes that are not within them yet.
+class Sight {
+ public:
+  Sight(const Camera& camera, const Lattice& level, const Reach& reach,
+        const std::array<int, 3>& quantum)
+      : camera_(camera), level_(level), reach_(reach), quantum_(quantum) {
+    const double pixel = 2 * camera.half_height / camera.height;
+    edges_ = {(0.5 * camera.width + reach.pixels) * pixel,
+              (0.5 * camera.height + reach.pixels) * pixel};
+  }
+
+  Units bounds() {
+    Units all{};
+    for (std::size_t a = 0; a < 3; ++a) all[a] = {0, (level_.dims[a] - 1) / quantum_[a] + 1};
+    found_ = {{{all[0][1], 0}, {all[1][1], 0}, {all[2][1], 0}}};
+    add(all);
+    if (found_[0][1] == 0) return {{{0, 1}, {0, 1}, {0, 1}}};
+    return found_;
+  }
+
+ private:
+  void add(const Units& units) {
+    bool within = true;
+    std::size_t longest = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      within = within && units[a][0] >= found_[a][0] && units[a][1] <= found_[a][1];
+      if (units[a][1] - units[a][0] > units[longest][1] - units[longest][0]) longest = a;
+    }
+    if (within || !may_be_seen(units)) return;
+    const auto [first, end] = units[longest];
+    if (end - first == 1) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        found_[a] = {std::min(found_[a][0], units[a][0]), std::max(found_[a][1], units[a][1])};
+      }
+      return;
+    }
+    Units half = units;
+    const int middle = first + (end - first) / 2;
+    half[longest] = {first, middle};
+    add(half);
+    half[longest] = {middle, end};
+    add(half);
+  }
+
+  // As the engine culls: unless every corner of the box of positions, widened by the reach of
+  // kernels, is outside of the same plane.
+  [[nodiscard]] bool may_be_seen(const Units& units) const {
+    std::array<std::array<double, 2>, 3> ends{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto& positions = level_.positions[a];
+      const int first = units[a][0] * quantum_[a];
+      const int last = std::min(units[a][1] * quantum_[a], level_.dims[a]) - 1;
+      const double eye = camera_.eye[static_cast<glm::length_t>(a)];
+      ends[a] = {positions[static_cast<std::size_t>(first)] - reach_.world[a] - eye,
+                 positions[static_cast<std::size_t>(last)] + reach_.world[a] - eye};
+    }
+    unsigned outside = 31;  // a bit for each plane
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 at{ends[0][corner & 1U], ends[1][corner >> 1U & 1U], ends[2][corner >> 2U]};
+      const double x = glm::dot(at, camera_.right);
+      const double y = glm::dot(at, camera_.up);
+      const double depth = glm::dot(at, camera_.forward);
+      const double z = camera_.perspective ? depth : 1;
+      unsigned here = 0;
+      here |= x < -edges_[0] * z ? 1U : 0U;
+      here |= x > edges_[0] * z ? 2U : 0U;
+      here |= y < -edges_[1] * z ? 4U : 0U;
+      here |= y > edges_[1] * z ? 8U : 0U;
+      here |= camera_.perspective && depth < camera_.near ? 16U : 0U;
+      outside &= here;
+    }
+    return outside == 0;
+  }
+
+  const Camera& camera_;
+  const Lattice& level_;
+  const Reach& reach_;
+  const std::array<int, 3> quantum_;
+  std::array<double, 2> edges_{};  // of the picture from its middle, at unit depth
+  Units found_{};
+};
+
+int rounded_up(int value, int unit) { return (value - 1) / unit * unit + unit; }
+
+// Below `most`, the least common multiple of both; otherwise `most`.
+int common_multiple(int quantum, int stride, int most) {
+  return static_cast<int>(std::min<std::int64_t>(std::lcm(std::int64_t{quantum}, stride), most));
+}
+
+// Bricks of the store, which are those of every level.
+std::array<int, 3> brick_of(const std::vector<ShownField>& shown, const data::DatasetInfo& info) {
+  std::array<int, 3> brick{1, 1, 1};
+  for (const ShownField& one : shown) {
+    const data::FieldInfo& field = *info.find(one.field);
+    for (std::size_t a = 0; a < 3; ++a) brick[a] = std::max(brick[a], field.box_chunk[a]);
+  }
+  return brick;
+}
+
+// Of the volumes of a box, and of those from which they are drawn; nullopt: a field has no such
+// level.
+std::optional<std::uint64_t> bytes_of(const std::vector<ShownField>& shown, const data::Box& box,
+                                      const data::Dataset& dataset) {
+  std::set<std::pair<std::string, data::Reduction>> counted;
+  std::uint64_t bytes = 0;
+  for (const auto& [field, how] : shown) {
+    if (!counted.emplace(field, how.reduction).second) continue;
+    const auto part = part_of_field(dataset, field, how, box);
+    if (!part) return std::nullopt;
+    bytes += part->bytes + (part->from ? part->from->bytes : 0);
+  }
+  return bytes;
+}
+
+// Samples have the key of Dataset::part().
+data::Derivation read_of(const data::FieldInfo& field, const data::StoredPart& part) {
+  data::Derivation out;
+  out.variant = data::part_variant;
+  if (part.level > 0) {
+    out.variant += "of level " + std::to_string(part.level) + ' ' +
+                   std::to_string(static_cast<int>(part.as)) + ' ';
+  }
+  out.variant += data::key_of(part.box);
+  out.bytes = part.box.samples() * static_cast<std::uint64_t>(components_of(field, part.as)) *
+              sizeof(float);
+  out.stored = part;
+  return out;
+}
+
+}  // namespace
+
+bool may_use_part(const View& view) { return !view.light && view.surfaces.empty(); }
+
+std::array<int, 3> least_quantum(const View& view, const std::array<int, 3>& dims,
+                                 const std::array<int, 3>& halvings) {
+  std::array<int, 3> quantum{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int samples = data::halved(dims[a], halvings[a]);
+    quantum[a] = std::min(brick_kernels, samples);
+    if (halvings != full) {
+      if (!shows_lines(view)) continue;
+      quantum[a] = common_multiple(quantum[a], halved_stride(view, halvings[a]), samples);
+      continue;
+    }
+    int strides = shows_lines(view) ? std::min(view.vector.stride.value_or(1), samples) : 1;
+    for (const protocol::ScalarView& scalar : *view.scalars) {
+      if (absorbs(scalar)) strides = common_multiple(strides, scalar.stride, samples);
+    }
+    const std::int64_t kernels = std::int64_t{brick_kernels} * strides;
+    quantum[a] = static_cast<int>(std::min<std::int64_t>(kernels, samples));
+  }
+  return quantum;
+}
+
+data::Box box_in_sight(const View& view, const Camera& camera, const Lattice& whole,
+                       const std::array<int, 3>& halvings, const std::array<int, 3>& quantum) {
+  const Lattice level = coarsen_lattice(whole, halvings);
+  const Reach reach = reach_of(view, camera, whole, halvings, level);
+  const Units units = Sight(camera, level, reach, quantum).bounds();
+  data::Box box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.first[a] = units[a][0] * quantum[a];
+    box.count[a] = std::min(units[a][1] * quantum[a], level.dims[a]) - box.first[a];
+  }
+  return box;
+}
+
+std::optional<data::Box> box_for(const View& view, const Camera& camera, const Lattice& whole,
+                                 const std::array<int, 3>& halvings,
+                                 const std::vector<ShownField>& shown,
+                                 const data::Dataset& dataset) {
+  std::vector<std::string> fields;
+  fields.reserve(shown.size());
+  for (const ShownField& field : shown) fields.push_back(field.field);
+  const auto has_room = [&](const data::Box& box) {
+    const auto bytes = static_cast<double>(bytes_of(shown, box, dataset).value());
+    return dataset.fits_beside_boxes(static_cast<std::uint64_t>(bytes / part_share_max), fields);
+  };
+  const std::array<int, 3> least = least_quantum(view, whole.dims, halvings);
+  std::array<int, 3> quantum = brick_of(shown, dataset.info());
+  for (std::size_t a = 0; a < 3; ++a) quantum[a] = rounded_up(quantum[a], least[a]);
+  for (;;) {
+    const data::Box box = box_in_sight(view, camera, whole, halvings, quantum);
+    if (!bytes_of(shown, box, dataset)) return std::nullopt;
+    if (has_room(box)) return box;
+    // Smaller units would hardly leave out more than one at each end.
+    data::Box inner = box;
+    for (std::size_t a = 0; a < 3; ++a) inner.count[a] = std::max(1, box.count[a] - 2 * quantum[a]);
+    if (quantum == least || !has_room(inner)) return std::nullopt;
+    for (std::size_t a = 0; a < 3; ++a) quantum[a] = rounded_up(quantum[a] / 2, least[a]);
+  }
+}
+
+std::optional<data::Derivation> part_of_field(const data::Dataset& dataset,
+                                              const std::string& field, const data::Coarsening& how,
+                                              const data::Box& box) {
+  const data::DatasetInfo& info = dataset.info();
+  const data::FieldInfo* const about = info.find(field);
+  if (about == nullptr) return std::nullopt;
+  const auto index = static_cast<std::size_t>(about - info.fields.data());
+  if (how.halvings == full) {
+    if (!about->is_read_by_boxes()) return std::nullopt;
+    return read_of(*about, {box});
+  }
+  if (auto level = stored_level(info, index, how)) {
+    level->box = box;
+    return read_of(*about, *level);
+  }
+  if (how.reduction != data::Reduction::drawn) return std::nullopt;
+  auto middles = stored_middles(info, index, how.stride);
+  if (!middles) return std::nullopt;
+  data::Coarsening of_box = how;
+  for (std::size_t a = 0; a < 3; ++a) {
+    of_box.first[a] = box.first[a] << how.halvings[a];
+    const int end = std::min((box.first[a] + box.count[a]) << how.halvings[a], info.grid.dims()[a]);
+    middles->box.first[a] = of_box.first[a] / how.stride;
+    middles->box.count[a] = (end - 1) / how.stride + 1 - middles->box.first[a];
+  }
+  data::Derivation out;
+  out.variant = data::part_variant + data::key_of(how) + ' ' + data::key_of(box);
+  out.bytes = box.samples() * about->components.size() * sizeof(float);
+  out.from = std::make_shared<const data::Derivation>(read_of(*about, *middles));
+  out.make = [of_box, dims = info.grid.dims()](const data::Volume& strided) {
+    return data::draw(strided, of_box, dims);
+  };
+  return out;
+}
+
+}  // namespace windsplat::scene
