@@ -39,6 +39,15 @@ Json parts_json(const std::vector<PartReport>& rows) {
   return out;
 }
 
+Json level_part_json(const LevelPart& part) {
+  Json out{{"halvings", part.halvings}};
+  if (part.box) {
+    out["first"] = (*part.box)[0];
+    out["count"] = (*part.box)[1];
+  }
+  return out;
+}
+
 }  // namespace
 
 Json frame_info_json(const FrameInfo& info) {
@@ -70,6 +79,10 @@ Json frame_info_json(const FrameInfo& info) {
              {"variant", info.variant},
              {"parts", parts_json(info.parts)}}}};
   if (info.streamlets) out["work"]["streamlets"] = streamlets_json(*info.streamlets);
+  if (info.detail) {
+    out["detail"] = {{"wanted", level_part_json(info.detail->wanted)},
+                     {"drawn", level_part_json(info.detail->drawn)}};
+  }
   if (!info.empty.empty()) out["empty"] = info.empty;
   return out;
 }

@@ -151,6 +151,15 @@ struct PartReport {
   std::int64_t count = 0;
   std::int64_t bytes = 0;
 };
+// Samples of a level of a dataset with stored levels.
+struct LevelPart {
+  std::array<int, 3> halvings{0, 0, 0};  // of the axes of the data
+  // Indices of the level's first sample and numbers of samples; absent in JSON: all of them.
+  std::optional<std::array<std::array<int, 3>, 2>> box;
+};
+struct DetailReport {
+  LevelPart wanted, drawn;
+};
 struct FrameInfo {
   std::string method = "kernel";
   std::string compositing = "analytic";
@@ -172,6 +181,7 @@ struct FrameInfo {
   std::int64_t bytes = 0;
   std::string variant;
   std::optional<StreamletCounts> streamlets;  // absent in JSON without streamlets
+  std::optional<DetailReport> detail;         // absent in JSON without stored levels
   std::vector<PartReport> parts;
   std::string empty;  // why the picture shows nothing of the data; absent in JSON if empty
 };

@@ -163,6 +163,13 @@ quality::Halvings halvings_of(const Prepared& prepared, const data::Dataset& dat
   return out;
 }
 
+std::optional<protocol::DetailReport> data_drawn(const scene::Scene& scene) {
+  if (!scene.wanted_level) return std::nullopt;
+  protocol::DetailReport out{{*scene.wanted_level, {}}, {scene.level, {}}};
+  if (const auto& part = scene.lattice.part) out.drawn.box = std::array{part->first, part->count};
+  return out;
+}
+
 Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& pool,
                                         const CancelToken& cancel, Workspace& workspace) {
   const scene::Scene& scene = prepared.scene;
@@ -392,6 +399,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   name_fields(scene, prepared.completed, drawn.work);
   drawn.parts = parts_of(prepared.completed, scene, workspace.figure ? &*workspace.figure : nullptr,
                          workspace.space.ground_bytes());
+  drawn.data_drawn = data_drawn(scene);
   drawn.view = prepared.completed.view();
   const bool transparent = drawn.work.variant.reference && is_transparent(workspace.space.image());
   auto missing = missing_surfaces(prepared, dataset);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/messages.hpp"
 #include "protocol/view.hpp"
 #include "server/annotate/figure.hpp"
 #include "server/annotate/paint/overlay.hpp"
@@ -81,6 +82,7 @@ struct Frame {
   quality::Halvings halvings{};             // of the data, by the size of the picture
   engine::WorkReport work;
   PartCounts parts{};
+  std::optional<protocol::DetailReport> data_drawn;  // of data with stored levels
   std::string empty;           // why the picture shows nothing of the data; empty if it shows some
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;

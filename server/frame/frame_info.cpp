@@ -93,6 +93,7 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.fields = work.fields;
   info.bytes = work.bytes;
   info.variant = engine::text_of(work.variant);
+  info.detail = frame.data_drawn;
   if (work.streamlets) info.streamlets = counts_of(*work.streamlets);
   info.parts = reports_of(frame.parts);
   info.empty = frame.empty;

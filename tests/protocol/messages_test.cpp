@@ -323,6 +323,17 @@ TEST(Shapes, FrameInfoCountsStreamletsWhereTheyAreTraced) {
                 "ends":{"length":12,"boundary":3,"mask":2,"stagnation":1,"steps":2}})"));
 }
 
+TEST(Shapes, FrameInfoNamesTheLevelAndThePartOfDataWithStoredLevels) {
+  FrameInfo info = frame_info();
+  EXPECT_FALSE(Json::parse(encode_frame_info(info)).contains("detail"));
+  info.detail.emplace().drawn = {{1, 1, 0},
+                                 std::array{std::array{64, 0, 8}, std::array{128, 64, 16}}};
+  const std::string json = encode_frame_info(info);
+  expect_shape("frameInfo", json);
+  EXPECT_EQ(Json::parse(json)["detail"], Json::parse(R"({"wanted":{"halvings":[0,0,0]},
+                "drawn":{"halvings":[1,1,0],"first":[64,0,8],"count":[128,64,16]}})"));
+}
+
 TEST(Shapes, FrameInfoHasARowForEachPart) {
   FrameInfo info = frame_info();
   for (const char* part : {"ground", "surfaces", "streamlets", "seeds", "light", "region",

@@ -21,7 +21,7 @@ import {
   slicePatch,
   sliceText,
 } from "../src/panels/controls";
-import { methodText, partsLine, workLines } from "../src/viewport/frame_text";
+import { detailLine, methodText, partsLine, workLines } from "../src/viewport/frame_text";
 import { legendEntries, sampleHeights } from "../src/view/legend_entries";
 import type { ChosenMessage, Dataset, Field, View } from "@windsplat/client";
 import { compassTicks } from "../src/base/ticks";
@@ -266,6 +266,29 @@ test("the HUD tells what was computed and is held for the parts of the picture",
     "ground 921.6 k pixels 3.4 MB · region 120 samples outside",
   );
   assert.equal(partsLine({ parts: [surfaces] }), "");
+});
+
+test("the HUD names the level and the part of a store that are drawn, and the level wanted", () => {
+  const level = (n: number) => ({ halvings: [n, n, n] as [number, number, number] });
+  const part = { first: [0, 64, 0], count: [64, 128, 64] } as {
+    first: [number, number, number];
+    count: [number, number, number];
+  };
+  const wanted = level(0);
+  assert.equal(detailLine({}), "");
+  assert.equal(detailLine({ detail: { wanted, drawn: level(0) } }), "");
+  assert.equal(
+    detailLine({ detail: { wanted, drawn: level(1) } }),
+    "level 1,1,1 · wanted full detail",
+  );
+  assert.equal(
+    detailLine({ detail: { wanted, drawn: { ...level(0), ...part } } }),
+    "full detail · part of 64 x 128 x 64 samples",
+  );
+  assert.equal(
+    detailLine({ detail: { wanted: level(1), drawn: { ...level(2), ...part } } }),
+    "level 2,2,2 · part of 64 x 128 x 64 samples · wanted level 1,1,1",
+  );
 });
 
 test("the HUD names method and compositing, and the samples that were skipped", () => {

@@ -153,6 +153,21 @@ export function partsLine({ parts }: Pick<ChosenMessage["work"], "parts">): stri
     .join(" · ");
 }
 
+// What of a dataset with stored levels is drawn, and what would suffice. Empty: it has none, or
+// every sample is drawn.
+export function detailLine({ detail }: Pick<ChosenMessage, "detail">): string {
+  if (detail === undefined) return "";
+  const { wanted, drawn } = detail;
+  if (drawn.count === undefined && drawn.halvings.every((n) => n === 0)) return "";
+  const part = drawn.count === undefined ? "" : ` · part of ${drawn.count.join(" x ")} samples`;
+  const finer =
+    wanted.halvings.join() === drawn.halvings.join() ? "" : ` · wanted ${levelText(wanted)}`;
+  return `${levelText(drawn)}${part}${finer}`;
+}
+
+const levelText = ({ halvings }: { halvings: number[] }): string =>
+  halvings.every((n) => n === 0) ? "full detail" : `level ${halvings.join(",")}`;
+
 // The work drawn, the work left out, and the cost.
 export function workLines({
   work,
@@ -170,5 +185,7 @@ export function workLines({
 }
 
 export function workText(chosen: ChosenMessage): string {
-  return [...workLines(chosen), partsLine(chosen.work)].filter((line) => line !== "").join("\n");
+  return [...workLines(chosen), detailLine(chosen), partsLine(chosen.work)]
+    .filter((line) => line !== "")
+    .join("\n");
 }
