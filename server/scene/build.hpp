@@ -8,7 +8,7 @@
 #include "server/base/error.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/scene/completed_view.hpp"
-#include "server/scene/parts.hpp"
+#include "server/scene/level/parts.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {

@@ -65,7 +65,7 @@ struct Lattice {
   // beyond their end; 0: it does not.
   int turn = 0;
   // The samples of which fields hold values, where these are a part of the lattice
-  // (scene/parts.hpp): whatever is drawn elsewhere lies beyond the picture. Everything else
+  // (scene/level/parts.hpp): whatever is drawn elsewhere lies beyond the picture. Everything else
   // describes the whole lattice, so that a picture does not depend on the part. nullopt: all.
   std::optional<data::Box> part;
   [[nodiscard]] data::Box held() const { return part ? *part : data::whole_box(dims); }

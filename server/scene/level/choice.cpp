@@ -12,8 +12,8 @@
 #include "protocol/view/shown.hpp"
 #include "server/data/model/stored.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/level/parts.hpp"
 #include "server/scene/lines/mark.hpp"
-#include "server/scene/parts.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
 

@@ -1,4 +1,4 @@
-#include "server/scene/parts.hpp"
+#include "server/scene/level/parts.hpp"
 
 #include <algorithm>
 #include <cmath>
