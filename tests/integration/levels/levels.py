@@ -60,7 +60,7 @@ class Levels(unittest.TestCase):
             write_store(folder / f"{name}_store.zarr", fields, axes, 2, CHAIN, 3, uneven)
             paths += [folder / f"{name}.nc", folder / f"{name}_store.zarr"]
         axes = [100.0 * np.arange(n) for n in LARGE]
-        fields = made(LARGE, 1, masked=False)
+        fields = cls.large = made(LARGE, 1, masked=False)
         write_netcdf(folder / "large.nc", fields, axes, 1)
         write_store(folder / "large_store.zarr", fields, axes, 1, CHAIN, 3)
         large = [folder / "large.nc", folder / "large_store.zarr"]
@@ -156,6 +156,91 @@ class Levels(unittest.TestCase):
             self.assertEqual(found.shape, wanted.shape)
             self.assertLess(np.sqrt(np.mean((found - wanted)**2)), 0.01)
             self.assertGreater(np.std(found), 0.02)
+
+    def detail(self, answer):
+        return json.loads(answer.headers["Windsplat-Frame"])["detail"]
+
+    def parts_of_views(self):
+        """Views of few samples of the large store, from outside and from within."""
+        look = {"projection": "perspective", "fovY": 8}
+        cloud = [{"field": "cloud", "color": {"range": [0, 2e-3]},
+                  "extinction": [[0, 0], [2e-3, 40]]}]
+        lines = {"field": "wind", "length": 0.02, "magnitudeRange": [0, 20], "stride": 1,
+                 "minMagnitude": 0}
+        for camera in ({"projection": "orthographic", "eye": [0.1, -2, 0.05],
+                        "target": [0.1, 0, 0.05], "height": 0.06},
+                       {**look, "eye": [0.3, -0.4, 0.2], "target": [0.9, 0.1, 0.5]},
+                       {**look, "eye": [0.1, 0.2, 1.5], "target": [0.1, 0.1, 0], "fovY": 3}):
+            for scalars, vector in ((cloud, {"field": None}), ([], lines), (cloud, lines)):
+                yield {"camera": camera, "scalars": scalars, "vector": vector,
+                       "image": {"width": 160, "height": 120}}
+
+    def test_a_store_that_exceeds_the_memory_is_drawn_from_the_part_in_sight(self):
+        """Level 0: equal to the same store in memory."""
+        parts = 0
+        for view in self.parts_of_views():
+            for method in ("kernel", "slab"):
+                here = {**view, "dataset": "large_store", "method": {"name": method}}
+                found = self.picture(self.tight, here, "application/x-npy")
+                detail = self.detail(found)
+                self.assertEqual(detail["wanted"], {"halvings": [0, 0, 0]}, view)
+                if detail["drawn"]["halvings"] != [0, 0, 0]:
+                    continue
+                drawn = detail["drawn"]
+                bytes_ = 4 * np.prod(drawn["count"]) * (
+                    len(view["scalars"]) + (3 if view["vector"]["field"] else 0))
+                self.assertLess(bytes_, 0.45 * 68 * 2**20)
+                wanted = self.picture(self.roomy, here, "application/x-npy")
+                self.assertEqual(self.detail(wanted)["drawn"], {"halvings": [0, 0, 0]})
+                self.assertEqual(found.body, wanted.body, view)
+                parts += 1
+        self.assertGreaterEqual(parts, 10)
+
+    def test_what_is_chosen_fits_beside_the_loader_and_the_part_before(self):
+        lines = {"field": "wind", "length": 0.02, "magnitudeRange": [0, 20], "stride": 1,
+                 "minMagnitude": 0}
+        cloud = [{"field": "cloud", "color": {"range": [0, 2e-3]},
+                  "extinction": [[0, 0], [2e-3, 40]]}]
+        for angle in range(9, 25, 3):
+            view = {"dataset": "large_store", "vector": lines, "scalars": cloud,
+                    "image": {"width": 48, "height": 36},
+                    "camera": {"projection": "perspective", "fovY": angle,
+                               "eye": [-0.4 + 0.01 * angle, -0.6, 0.2], "target": [0.1, 0.6, 0.1]}}
+            self.assertTrue(self.detail(self.picture(self.tight, view)))
+
+    def test_a_zoom_ends_with_every_sample(self):
+        """From the whole to single voxels: levels never get coarser, and a pick is exact."""
+        finest = [9, 9, 9]
+        for height in (1.2, 0.6, 0.3, 0.1, 0.03, 0.01, 0.003):
+            view = {"dataset": "large_store", "vector": {"field": None},
+                    "scalars": [{"field": "cloud", "color": {"range": [0, 2e-3]},
+                                 "extinction": [[0, 1], [2e-3, 40]]}],
+                    "image": {"width": 160, "height": 120},
+                    "camera": {"projection": "orthographic", "eye": [0.1, -2, 0.05],
+                               "target": [0.1, 0, 0.05], "height": height}}
+            drawn = self.detail(self.picture(self.tight, view))["drawn"]
+            self.assertTrue(all(a <= b for a, b in zip(drawn["halvings"], finest)), height)
+            finest = drawn["halvings"]
+        self.assertEqual(finest, [0, 0, 0])
+        self.assertLess(np.prod(drawn["count"]), 0.2 * np.prod(LARGE))
+        picks = [daemon.post("/v1/picks?x=80&y=60", view)
+                 for daemon in (self.tight, self.roomy)]
+        self.assertEqual([one.status for one in picks], [200, 200], picks[0].body[:500])
+        self.assertEqual(picks[0].body, picks[1].body)
+        found = picks[0].json()["feature"]
+        x, y, z = (found["position"]["index"][axis] for axis in "xyz")
+        self.assertEqual(np.float32(found["value"]), self.large["cloud"][0][z, y, x])
+
+    def test_a_picture_of_a_part_does_not_depend_on_what_was_drawn_before(self):
+        views = [{**view, "dataset": "large_store"} for view in self.parts_of_views()]
+        first = [self.picture(self.tight, view).body for view in views]
+        again = [self.picture(self.tight, view).body for view in reversed(views)]
+        self.assertEqual(first, again[::-1])
+
+    def test_light_and_surfaces_are_those_of_whole_levels(self):
+        view = next(self.parts_of_views())
+        lit = {**view, "dataset": "large_store", "light": {}}
+        self.assertNotIn("count", self.detail(self.picture(self.tight, lit))["drawn"])
 
     def test_what_shows_every_sample_is_refused_with_the_limit_that_would_suffice(self):
         image = {"width": 64, "height": 48}

@@ -1,0 +1,440 @@
+// Pictures drawn from the part of a level that is in sight, against those of the whole level.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <memory>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/view/shown.hpp"
+#include "server/data/model/stored.hpp"
+#include "server/engine/reference/reference.hpp"
+#include "server/frame/cost.hpp"
+#include "server/frame/drawn_samples.hpp"
+#include "server/frame/pick/pick.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/level/choice.hpp"
+#include "server/scene/level/parts.hpp"
+#include "tests/numerics/scenes.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+using data::Coarsening;
+using data::Reduction;
+using data::StoredAs;
+using data::Volume;
+using scene::Scene;
+
+constexpr std::array<int, 3> dims{90, 75, 61};
+constexpr std::uint64_t samples_bytes = std::uint64_t{90} * 75 * 61 * sizeof(float);
+constexpr int levels = 4;
+
+// A cloud and a wind, whose levels are those of coarsen(), on even axes or an uneven vertical one.
+class Store final : public data::Source {
+ public:
+  explicit Store(bool uneven) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      data::Axis& axis = info_.grid.axes.at(a);
+      axis.name = "xyz"[a];
+      axis.units = "m";
+      for (int n = 0; n < dims.at(a); ++n) {
+        axis.coordinates.push_back(uneven && a == 2 ? 60.0 * n + n * n : 100.0 * n);
+      }
+    }
+    info_.fields.resize(2);
+    info_.fields[0].name = "cloud";
+    info_.fields[0].components = {"cloud"};
+    info_.fields[1].name = "wind";
+    info_.fields[1].kind = data::FieldKind::vector;
+    info_.fields[1].components = {"u", "v", "w"};
+    for (data::FieldInfo& field : info_.fields) field.box_chunk = {16, 16, 16};
+    info_.steps.resize(1);
+    data::StoredLevels stored;
+    for (int h = 0; h < levels; ++h) stored.levels.push_back({h, h, h});
+    if (uneven) stored.widths[2] = widths(2);
+    stored.fields.resize(2);
+    for (std::size_t f = 0; f < 2; ++f) {
+      stored.fields[f].has_levels = true;
+      stored.fields[f].ranges.push_back({made(f).range, made(f).masked});
+    }
+    stored.fields[1].strided = levels - 1;
+    info_.stored = std::make_shared<const data::StoredLevels>(std::move(stored));
+  }
+  [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
+  Result<Volume> read(std::size_t field, std::size_t /*step*/) override { return made(field); }
+  Result<Volume> read_part(std::size_t field, std::size_t /*step*/,
+                           const data::StoredPart& part) override {
+    if (auto fine = check_part(field, part); !fine) return fine.error();
+    if (part.as == StoredAs::samples) return cut(made(field), part.box);
+    if (part.as == StoredAs::strided) return cut(middles(made(field), part.level), part.box);
+    Coarsening how;
+    how.halvings.fill(static_cast<int>(part.level));
+    for (std::size_t a = 0; a < 3; ++a) how.widths.at(a) = widths(a);
+    how.reduction = part.as == StoredAs::drawn ? Reduction::drawn : Reduction::two_values;
+    const Volume level = coarsen(made(field), how);
+    if (part.as == StoredAs::drawn) return cut(level, part.box);
+    return two_values(level, part.box, made(field).range);
+  }
+
+ private:
+  [[nodiscard]] std::vector<double> widths(std::size_t a) const {
+    const auto& at = info_.grid.axes.at(a).coordinates;
+    std::vector<double> out;
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const double low = n == 0 ? at[0] - (at[1] - at[0]) / 2 : (at[n - 1] + at[n]) / 2;
+      const double high =
+          n + 1 == at.size() ? at[n] + (at[n] - at[n - 1]) / 2 : (at[n] + at[n + 1]) / 2;
+      out.push_back(high - low);
+    }
+    return out;
+  }
+
+  // cut() of the four components, which are no vector.
+  static Volume two_values(const Volume& level, const data::Box& box,
+                           const std::array<float, 2>& range) {
+    Volume out;
+    out.dims = box.count;
+    out.components = level.components;
+    std::vector<float> values;
+    for (int c = 0; c < level.components; ++c) {
+      Volume one;
+      one.dims = level.dims;
+      one.values = std::vector<float>(level.component(c), level.component(c) + level.samples());
+      const Volume part = cut(one, box);
+      values.insert(values.end(), part.values.data(), part.values.data() + part.samples());
+      out.masked = part.masked;
+    }
+    out.values = std::move(values);
+    out.range = range;
+    return out;
+  }
+
+  static Volume middles(const Volume& fine, std::size_t level) {
+    const int stride = 1 << level;
+    Volume out;
+    out.components = fine.components;
+    for (std::size_t a = 0; a < 3; ++a) out.dims[a] = (fine.dims[a] + stride - 1) / stride;
+    std::vector<float> values;
+    for (int c = 0; c < fine.components; ++c) {
+      for (int k = 0; k < out.dims[2]; ++k) {
+        for (int j = 0; j < out.dims[1]; ++j) {
+          for (int i = 0; i < out.dims[0]; ++i) {
+            const int x = data::strided_sample(i, stride, fine.dims[0]);
+            const int y = data::strided_sample(j, stride, fine.dims[1]);
+            const int z = data::strided_sample(k, stride, fine.dims[2]);
+            values.push_back(fine.component(c)[(z * fine.dims[1] + y) * fine.dims[0] + x]);
+          }
+        }
+      }
+    }
+    out.values = std::move(values);
+    finish_volume(out);
+    return out;
+  }
+
+  // With a hole, in every component.
+  static const Volume& made(std::size_t field) {
+    static const std::array<Volume, 2> volumes = [] {
+      std::array<Volume, 2> all;
+      for (std::size_t f = 0; f < 2; ++f) {
+        Volume& out = all.at(f);
+        out.dims = dims;
+        out.components = f == 0 ? 1 : 3;
+        std::vector<float> values;
+        for (int c = 0; c < out.components; ++c) {
+          for (int k = 0; k < dims[2]; ++k) {
+            for (int j = 0; j < dims[1]; ++j) {
+              for (int i = 0; i < dims[0]; ++i) {
+                const bool hole = i / 20 == 1 && j / 20 == 1 && k / 20 == 1;
+                const double wave = std::sin(0.9 * i + c) + std::sin(1.1 * j) * std::cos(0.7 * k);
+                values.push_back(hole ? NAN : static_cast<float>(f == 0 ? std::abs(wave) : wave));
+              }
+            }
+          }
+        }
+        out.values = std::move(values);
+        finish_volume(out);
+      }
+      return all;
+    }();
+    return volumes.at(field);
+  }
+
+  data::DatasetInfo info_;
+};
+
+data::Dataset store(std::uint64_t bytes, bool uneven = false) {
+  return {std::make_unique<Store>(uneven), "store", bytes};
+}
+
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+  double within(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_()) / 4294967296.0;
+  }
+  int below(int count) { return static_cast<int>(engine_() % static_cast<std::uint32_t>(count)); }
+  protocol::Vec3 point(double size) {
+    return {within(-size, size), within(-size, size), within(-size, size)};
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+// A view of a corner or of much of the data from outside or inside, with any layers.
+protocol::View random_view(Random& random) {
+  protocol::View view;
+  view.dataset = "store";
+  view.image.width = 20 + random.below(60);
+  view.image.height = 20 + random.below(60);
+  const bool perspective = random.below(3) > 0;
+  view.camera.projection =
+      perspective ? protocol::Projection::perspective : protocol::Projection::orthographic;
+  view.camera.eye = random.point(random.below(2) == 0 ? 0.5 : 1.5);
+  view.camera.target = random.point(0.5);
+  view.camera.fov_y = std::exp(random.within(std::log(2), std::log(50)));
+  if (!perspective) view.camera.height = std::exp(random.within(std::log(0.02), std::log(0.8)));
+  view.scalars.emplace();
+  const int layers = random.below(3);
+  if (layers > 0) {
+    protocol::ScalarView& medium = view.scalars->emplace_back();
+    medium.field = "cloud";
+    medium.color.range = {0.0, 2.0};
+    medium.extinction = {{{0.2, 0.0}, {2.0, random.within(0.5, 40)}}};
+    medium.min_optical_depth = random.below(2) == 0 ? 0 : 1e-2;
+  }
+  protocol::VectorView& lines = view.vector;
+  lines.field = {protocol::FieldChoice::Kind::none, ""};
+  if (layers == 1) return view;
+  lines.field = {protocol::FieldChoice::Kind::named, "wind"};
+  lines.stride = std::array{1, 2, 3, 4, 8}.at(static_cast<std::size_t>(random.below(5)));
+  lines.length = random.within(0.005, 0.1);
+  lines.magnitude_range = {0.0, 2.0};
+  lines.min_magnitude = random.below(2) == 0 ? 0.0 : 0.4;
+  lines.color.by = std::array{protocol::ColorBy::world_z, protocol::ColorBy::screen_z,
+                              protocol::ColorBy::rise, protocol::ColorBy::magnitude}
+                       .at(static_cast<std::size_t>(random.below(4)));
+  return view;
+}
+
+// The scene of a part, drawn from all samples of its level.
+Scene of_whole_level(const Scene& part, const scene::CompletedView& completed,
+                     data::Dataset& roomy) {
+  Scene whole = part;
+  whole.lattice.part.reset();
+  const Coarsening how = scene::coarsening_of(completed.lattice(), part.level);
+  for (scene::ScalarLayer& layer : whole.scalars)
+    layer.field = roomy.level("cloud", 0, how).value();
+  if (whole.vector) {
+    whole.vector->field = roomy.level("wind", 0, scene::drawn(how, completed.view())).value();
+  }
+  return whole;
+}
+
+std::vector<float> picture_of(const Scene& scene, engine::WorkReport* work = nullptr) {
+  if (scene.method == scene::Method::reference) {
+    ThreadPool pool(1);
+    const auto truth = engine::reference::render(scene, pool, CancelToken(), {}, {}).value();
+    return {truth.rgba.begin(), truth.rgba.end()};
+  }
+  const engine::Rendered drawn = test::render(scene);
+  if (work != nullptr) *work = drawn.work;
+  return drawn.image.rgba;
+}
+
+double share_of(const Scene& part) {
+  double share = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    share *= static_cast<double>(part.lattice.held().count[a]) / part.lattice.dims[a];
+  }
+  return share;
+}
+
+struct Tally {
+  int parts = 0;
+  int drawn = 0;  // pictures that show something
+  std::map<int, int> by_level;
+};
+
+// Draws what a memory limit leaves of random views, twice.
+void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName method,
+             Tally& tally) {
+  Random random(seed);
+  data::Dataset roomy = store(100 * samples_bytes, uneven);
+  for (int n = 0; n < views; ++n) {
+    // From a fraction of a scalar to most of the fields.
+    const double share = std::exp(random.within(std::log(0.3), std::log(4)));
+    data::Dataset tight =
+        store(static_cast<std::uint64_t>(share * static_cast<double>(samples_bytes)), uneven);
+    protocol::View view = random_view(random);
+    view.method.name = method;
+    if (method == protocol::MethodName::reference) view.image = {12, 9};
+    const auto plain = scene::complete(view, roomy);
+    ASSERT_TRUE(plain) << plain.error().message;
+    const auto completed = plain->coarsened(random.below(3));
+    const scene::DrawnPart chosen = scene::part_of(completed, tight);
+    if (!chosen.box) continue;
+    const auto part = scene::build_scene(completed, tight);
+    ASSERT_TRUE(part) << part.error().message;
+    const Scene whole = of_whole_level(*part, completed, roomy);
+    engine::WorkReport of_part, of_whole;
+    const std::vector<float> found = picture_of(*part, &of_part);
+    const std::vector<float> wanted = picture_of(whole, &of_whole);
+    ASSERT_EQ(found, wanted) << n << " of seed " << seed;
+    // Every brick that is not culled is in the part.
+    EXPECT_EQ(of_part.samples - of_part.culled, of_whole.samples - of_whole.culled);
+    EXPECT_EQ(of_part.skipped_bound, of_whole.skipped_bound);
+    EXPECT_EQ(of_part.pixel_updates, of_whole.pixel_updates);
+    tally.parts += share_of(*part) < 1 ? 1 : 0;
+    const auto shows = [](float v) { return v > 0; };
+    const bool any = std::any_of(found.begin(), found.end(), shows);
+    tally.drawn += any ? 1 : 0;
+    if (any) ++tally.by_level[part->level[0]];
+  }
+}
+
+TEST(Part, PicturesOfBothMethodsAreThoseOfTheWholeLevel) {
+  Tally tally;
+  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+    compare(false, 1, 60, method, tally);
+    compare(true, 2, 60, method, tally);
+  }
+  EXPECT_GT(tally.parts, 60);
+  EXPECT_GT(tally.drawn, 80);
+  for (int level = 0; level < levels; ++level) EXPECT_GT(tally.by_level[level], 4) << level;
+}
+
+TEST(Part, TheReferenceIsThatOfTheWhole) {
+  Tally tally;
+  compare(false, 3, 80, protocol::MethodName::reference, tally);
+  EXPECT_GT(tally.drawn, 2);
+}
+
+protocol::View of_one_voxel() {
+  protocol::View view;
+  view.dataset = "store";
+  view.image = {40, 30};
+  view.camera.projection = protocol::Projection::orthographic;
+  view.camera.eye = {0.1, -2, 0.05};
+  view.camera.target = {0.1, 0, 0.05};
+  view.camera.height = 0.004;
+  view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  protocol::ScalarView& medium = view.scalars.emplace().emplace_back();
+  medium.field = "cloud";
+  medium.color.range = {0.0, 2.0};
+  medium.extinction = {{{0.0, 0.1}, {2.0, 20.0}}};
+  return view;
+}
+
+TEST(Part, AViewOfFewVoxelsHasTheirExactValues) {
+  data::Dataset tight = store(samples_bytes / 2);
+  data::Dataset roomy = store(100 * samples_bytes);
+  const auto completed = scene::complete(of_one_voxel(), tight).value();
+  const auto part = scene::build_scene(completed, tight).value();
+  EXPECT_EQ(part.level, (std::array{0, 0, 0}));
+  ASSERT_TRUE(part.lattice.part);
+  EXPECT_LT(share_of(part), 0.2);
+  const auto picked = pick(part, 20, 15, CancelToken()).value();
+  ASSERT_TRUE(picked);
+  const auto volume = roomy.volume("cloud", 0).value();
+  const auto& [x, y, z] = picked->sample;
+  EXPECT_EQ(static_cast<float>(picked->value),
+            volume->values[static_cast<std::size_t>((z * dims[1] + y) * dims[0] + x)]);
+  const auto whole = of_whole_level(part, completed, roomy);
+  EXPECT_EQ(picked->sample, pick(whole, 20, 15, CancelToken()).value()->sample);
+}
+
+TEST(Part, AChoiceDoesNotDependOnWhatIsResident) {
+  data::Dataset fresh = store(samples_bytes / 2);
+  data::Dataset used = store(samples_bytes / 2);
+  protocol::View other = of_one_voxel();
+  other.camera.eye = {-0.3, -2, 0.05};
+  other.camera.target = {-0.3, 0, 0.05};
+  ASSERT_TRUE(scene::build_scene(other, used));
+  const auto one = scene::build_scene(of_one_voxel(), fresh).value();
+  const auto two = scene::build_scene(of_one_voxel(), used).value();
+  EXPECT_EQ(one.level, two.level);
+  EXPECT_EQ(one.lattice.part, two.lattice.part);
+}
+
+TEST(Part, BoxesBeginWithBricksOfEveryStride) {
+  Random random(7);
+  for (int n = 0; n < 50; ++n) {
+    protocol::View view = random_view(random);
+    data::Dataset roomy = store(100 * samples_bytes);
+    const auto completed = scene::complete(view, roomy).value();
+    for (int h = 0; h < levels; ++h) {
+      const auto quantum = scene::least_quantum(completed.view(), dims, {h, h, h});
+      const data::Box box = scene::box_in_sight(completed.view(), completed.camera(),
+                                                completed.lattice(), {h, h, h}, quantum);
+      const bool strided = h == 0 && protocol::has_strided_lines(completed.view());
+      const int stride = strided ? *completed.view().vector.stride : 1;
+      for (std::size_t a = 0; a < 3; ++a) {
+        EXPECT_EQ(box.first[a] % (8 * stride), 0);
+        const int end = box.first[a] + box.count[a];
+        EXPECT_TRUE(end % (8 * stride) == 0 || end == data::halved(dims[a], h)) << end;
+      }
+    }
+  }
+}
+
+TEST(Part, StridesWithoutASmallCommonMultipleTakeWholeAxes) {
+  protocol::View view = of_one_voxel();
+  view.vector.field.name = "wind";
+  view.vector.stride = 41;
+  for (const int stride : {64, 63, 59, 55}) {
+    view.scalars->push_back(view.scalars->front());
+    view.scalars->back().stride = stride;
+  }
+  const auto quantum = scene::least_quantum(view, dims, {0, 0, 0});
+  EXPECT_EQ(quantum, dims);
+  data::Dataset tight = store(samples_bytes / 2);
+  const auto completed = scene::complete(view, tight).value();
+  EXPECT_FALSE(scene::part_of(completed, tight).box);
+}
+
+TEST(Part, LightSurfacesAndStreamletsShowTheWhole) {
+  protocol::View view = of_one_voxel();
+  EXPECT_TRUE(scene::may_use_part(view));
+  view.light.emplace();
+  EXPECT_FALSE(scene::may_use_part(view));
+  view.light.reset();
+  view.surfaces.emplace_back();
+  EXPECT_FALSE(scene::may_use_part(view));
+}
+
+TEST(Part, CostCountsThePart) {
+  data::Dataset tight = store(samples_bytes / 2);
+  data::Dataset roomy = store(100 * samples_bytes);
+  protocol::View view = of_one_voxel();
+  view.image = {320, 240};
+  view.method.detail = protocol::Detail::full;
+  const auto of = [&](data::Dataset& dataset) {
+    return cost_of(scene::outline(view, dataset.info()).value(), dataset).kernels;
+  };
+  const auto outline = scene::outline(view, tight.info()).value();
+  ASSERT_TRUE(scene::part_of(outline, tight).box);
+  EXPECT_LT(of(tight), 0.9 * of(roomy));
+}
+
+TEST(Part, SamplesOfAPartHaveIndicesOfTheWhole) {
+  data::Dataset tight = store(samples_bytes / 2);
+  const auto part = scene::build_scene(of_one_voxel(), tight).value();
+  const DrawnSamples samples(part);
+  const data::Box box = *part.lattice.part;
+  EXPECT_EQ(samples.low(), box.first);
+  EXPECT_EQ(samples.count(), static_cast<std::int64_t>(box.samples()));
+  EXPECT_EQ(samples.number(box.first), 0U);
+  EXPECT_FALSE(samples.contains({box.first[0], box.first[1] - 1, box.first[2]}));
+}
+
+}  // namespace
+}  // namespace windsplat::frame
