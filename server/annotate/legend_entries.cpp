@@ -12,6 +12,7 @@
 #include "server/annotate/labels.hpp"
 #include "server/annotate/paint/type.hpp"
 #include "server/annotate/section_text.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/image/tone_map.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
@@ -159,9 +160,24 @@ std::string fading_text(const scene::Scene& scene) {
   return (by.size() == 1 ? by[0] : by[0] + " and " + by[1]) + " lines are darker";
 }
 
+// Of the whole field at the step, of which a part of the samples may be held.
+std::array<float, 2> range_of(const Subject& subject, const std::string& name,
+                              const data::Volume& held) {
+  const scene::Scene& scene = subject.scene;
+  const data::FieldInfo* const field = subject.info.find(name);
+  if (!scene.lattice.part || scene.level != std::array{0, 0, 0} || field == nullptr) {
+    return held.range;
+  }
+  const auto index = static_cast<std::size_t>(field - subject.info.fields.data());
+  const auto step = static_cast<std::size_t>(subject.completed.view().step);
+  const auto* const stored = data::stored_range(subject.info, index, step);
+  return stored == nullptr ? held.range : stored->range;
+}
+
 // Of the lines that are drawn.
-std::array<float, 2> drawn_magnitudes(const scene::VectorLayer& layer) {
-  const auto [least, most] = layer.field->range;
+std::array<float, 2> drawn_magnitudes(const Subject& subject, const scene::VectorLayer& layer) {
+  const auto [least, most] =
+      range_of(subject, subject.completed.view().vector.field.name, *layer.field);
   return {std::max(least, static_cast<float>(layer.min_magnitude)), most};
 }
 
@@ -213,7 +229,7 @@ LegendEntry lines_entry(const Subject& subject) {
     case LineColor::magnitude:
       entry.title += "magnitude";
       entry.units = units;
-      entry.beyond = beyond_ends(range, drawn_magnitudes(layer));
+      entry.beyond = beyond_ends(range, drawn_magnitudes(subject, layer));
       // Lines through seeds are too few to count by the values of all samples.
       if (range[0] <= range[1] && entry.beyond[1] && !seeded) {
         entry.notes.push_back(beyond_text(layer, range[1]));
@@ -229,7 +245,8 @@ LegendEntry lines_entry(const Subject& subject) {
       const data::FieldInfo* const scalar = subject.info.find(name);
       entry.title += field_title(subject, scalar, name);
       entry.units = scalar == nullptr ? std::string() : unit_text(scalar->units);
-      if (layer.color_field) entry.beyond = beyond_ends(range, layer.color_field->range);
+      if (layer.color_field)
+        entry.beyond = beyond_ends(range, range_of(subject, name, *layer.color_field));
       break;
     }
     case LineColor::constant:
@@ -273,8 +290,9 @@ std::vector<Point> opacity_curve(const scene::ScalarLayer& layer, double most) {
 }
 
 // The values of the field, without those that are transparent at an end of the opacity curve.
-std::array<float, 2> drawn_values(const scene::ScalarLayer& layer) {
-  auto [least, most] = layer.field->range;
+std::array<float, 2> drawn_values(const Subject& subject, const scene::ScalarLayer& layer,
+                                  const std::string& name) {
+  auto [least, most] = range_of(subject, name, *layer.field);
   const auto& curve = layer.extinction;
   if (curve.empty()) return {least, most};
   if (curve.front()[1] <= 0) least = std::max(least, static_cast<float>(curve.front()[0]));
@@ -290,7 +308,7 @@ LegendEntry medium_entry(const Subject& subject, const scene::ScalarLayer& layer
   entry.units = field == nullptr ? std::string() : unit_text(field->units);
   entry.colors = colors_of(layer.color);
   entry.ticks = strip_ticks(layer.color.range);
-  entry.beyond = beyond_ends(layer.color.range, drawn_values(layer));
+  entry.beyond = beyond_ends(layer.color.range, drawn_values(subject, layer, name));
   double most = 0;
   for (const auto& [value, extinction] : layer.extinction) most = std::max(most, extinction);
   if (most > 0) {

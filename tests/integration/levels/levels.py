@@ -196,6 +196,21 @@ class Levels(unittest.TestCase):
                 parts += 1
         self.assertGreaterEqual(parts, 10)
 
+    def test_the_legend_of_a_part_marks_values_that_only_the_whole_has(self):
+        view = {"dataset": "large_store", "vector": {"field": None},
+                "scalars": [{"field": "cloud", "color": {"range": [0, 1e-3]},
+                             "extinction": [[0, 0.1], [1e-3, 40]]}],
+                "annotations": {"legend": True}, "image": {"width": 320, "height": 240},
+                "camera": {"projection": "orthographic", "eye": [0.8, -2, 0.4],
+                           "target": [0.8, 0, 0.4], "height": 0.05}}
+        self.assertGreater(self.large["cloud"].max(), 1e-3)
+        part = self.picture(self.tight, view)
+        drawn = self.detail(part)["drawn"]
+        self.assertEqual(drawn["halvings"], [0, 0, 0])
+        x, y, z = (slice(a, a + n) for a, n in zip(drawn["first"], drawn["count"]))
+        self.assertLess(self.large["cloud"][0][z, y, x].max(), 1e-3)
+        self.assertEqual(part.body, self.picture(self.roomy, view).body)
+
     def test_what_is_chosen_fits_beside_the_loader_and_the_part_before(self):
         lines = {"field": "wind", "length": 0.02, "magnitudeRange": [0, 20], "stride": 1,
                  "minMagnitude": 0}
