@@ -132,12 +132,14 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
       all.push_back(std::move(reason));
     }
   };
-  if (scene.vector) add(why_no_lines(*scene.vector, view, scene.slice));
+  // What is held of a part explains nothing of the whole.
+  const bool part = scene.lattice.part.has_value();
+  if (scene.vector) add(part ? "" : why_no_lines(*scene.vector, view, scene.slice));
   auto layer = scene.scalars.begin();
   for (std::size_t i = 0; i < view.scalars->size() && layer != scene.scalars.end(); ++i) {
     const protocol::ScalarView& scalar = (*view.scalars)[i];
     if (layer->extinction != scalar.extinction.value()) continue;
-    add(why_no_medium(*layer, scalar.field, i, view, scene.slice));
+    add(part ? "" : why_no_medium(*layer, scalar.field, i, view, scene.slice));
     ++layer;
   }
   all.insert(all.end(), surfaces.begin(), surfaces.end());
