@@ -2,6 +2,7 @@
 #include "server/cli/limited_picture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -162,6 +163,23 @@ std::string report_line(const Picture& picture) {
   return protocol::encode_frame_report(picture.info, milliseconds(picture.frame.render_us),
                                        milliseconds(picture.frame.encode_us)) +
          '\n';
+}
+
+std::string coarser_level_of(const Picture& picture) {
+  const auto& detail = picture.frame.data_drawn;
+  if (!detail) return "";
+  const auto& drawn = detail->drawn.halvings;
+  const auto& wanted = detail->wanted.halvings;
+  bool is_coarser = false;
+  for (std::size_t a = 0; a < 3; ++a) is_coarser = is_coarser || drawn[a] > wanted[a];
+  if (!is_coarser) return "";
+  const auto text_of = [](const std::array<int, 3>& halvings) {
+    return std::to_string(halvings[0]) + ',' + std::to_string(halvings[1]) + ',' +
+           std::to_string(halvings[2]);
+  };
+  return "the data are drawn with their axes halved " + text_of(drawn) + " times, where " +
+         text_of(wanted) +
+         " would suffice: more does not fit into --memory-limit; the error does not include that";
 }
 
 std::string exceeded_limits(const Picture& picture) {

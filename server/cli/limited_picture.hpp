@@ -67,6 +67,10 @@ class LimitedPictures {
 // The report of a picture as a line of JSON.
 std::string report_line(const Picture& picture);
 
+// Which level of the data the picture has in place of a finer one that would suffice for it but
+// does not fit into the memory; empty: none.
+std::string coarser_level_of(const Picture& picture);
+
 // Text on each limit of the view that the picture does not keep; empty if it keeps them.
 std::string exceeded_limits(const Picture& picture);
 

@@ -66,6 +66,7 @@ Result<void> render(const RenderArguments& arguments) {
   detail(std::to_string(sheet->width) + " x " + std::to_string(sheet->height) + " pixels in " +
          seconds_text(seconds_since(start)) + " to " + in_quotes(arguments.output));
   if (!sheet->exceeded.empty()) note(sheet->exceeded);
+  if (!sheet->coarser.empty()) note(sheet->coarser);
   if (!sheet->empty.empty()) note("the picture shows nothing of the data: " + sheet->empty);
   if (!sheet->empty_surfaces.empty()) note("a surface is empty: " + sheet->empty_surfaces);
   auto written = write_output(arguments.output, sheet->bytes);

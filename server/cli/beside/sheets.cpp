@@ -47,6 +47,7 @@ Result<Sheet> Sheets::draw(const CancelToken& cancel, const ShowDone& show) {
     if (!picture) return picture.error();
     sheet.reports += report_line(*picture);
     add_text(exceeded_limits(*picture), pair, n, sheet.exceeded);
+    add_text(coarser_level_of(*picture), pair, n, sheet.coarser);
     add_text(picture->frame.empty, pair, n, sheet.empty);
     std::string reasons;
     for (const std::string& reason : picture->empty_surfaces) {

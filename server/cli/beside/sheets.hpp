@@ -21,6 +21,7 @@ struct Sheet {
   std::string reports;  // a line of JSON for each picture, from left to right
   // On each limit that a picture exceeds; why a picture shows nothing of the data. Empty: none.
   std::string exceeded;
+  std::string coarser;  // coarser_level_of() each picture
   std::string empty;
   std::string empty_surfaces;  // why a picture that shows something lacks some of its surfaces
 };

@@ -8,6 +8,7 @@ import io
 import json
 import pathlib
 import re
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -195,6 +196,25 @@ class Levels(unittest.TestCase):
                 self.assertEqual(found.body, wanted.body, view)
                 parts += 1
         self.assertGreaterEqual(parts, 10)
+
+    def test_render_says_that_a_coarser_level_is_drawn_than_would_suffice(self):
+        view = {"vector": {"field": None}, "method": {"name": "kernel"},
+                "scalars": [{"field": "cloud", "color": {"range": [0, 1e-3]},
+                             "extinction": [[0, 0.1], [1e-3, 40]]}],
+                "image": {"width": 640, "height": 480},
+                "camera": {"projection": "orthographic", "eye": [0, -2, 0], "target": [0, 0, 0],
+                           "height": 1}}
+        folder = pathlib.Path(self.folder.name)
+        (folder / "view.json").write_text(json.dumps(view))
+        said = {}
+        for limit in (f"{LIMIT}M", "1500M"):
+            done = subprocess.run(
+                [PROGRAM, "render", folder / "large_store.zarr", "--view", folder / "view.json",
+                 "--memory-limit", limit, "-o", folder / "render.png"],
+                capture_output=True, text=True, check=True)
+            said[limit] = done.stderr
+        self.assertIn("where 0,0,0 would suffice", said[f"{LIMIT}M"])
+        self.assertNotIn("would suffice", said["1500M"])
 
     def test_the_legend_of_a_part_marks_values_that_only_the_whole_has(self):
         view = {"dataset": "large_store", "vector": {"field": None},
