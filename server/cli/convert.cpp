@@ -26,6 +26,7 @@
 #include "server/cli/signals.hpp"
 #include "server/convert/verify.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/model/stored.hpp"
 #include "server/data/resident/budget.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/scene/detail.hpp"
@@ -54,7 +55,9 @@ struct ConvertArguments {
   bool verify = false;
 };
 
-// Full detail and every coarser level, as pictures of the default placement choose them.
+// Full detail and every coarser level, as pictures of the default placement choose them. Of data
+// with coarser levels at least so many that the middles of kernels of the widest stride are stored:
+// the default lines of data that do not fit into memory are drawn from them.
 Result<std::vector<data::Coarsening>> levels_of(const data::DatasetInfo& info) {
   const auto lattice = scene::place_lattice(info.grid, protocol::GeometryView{});
   if (!lattice) return lattice.error();
@@ -67,7 +70,9 @@ Result<std::vector<data::Coarsening>> levels_of(const data::DatasetInfo& info) {
     }
     return product;
   };
-  while (samples() > coarsest_samples && std::ranges::max(level) < halvings_max) {
+  const std::size_t least = samples() > coarsest_samples ? 1 + data::strided_levels_max : 1;
+  while ((samples() > coarsest_samples || out.size() < least) &&
+         std::ranges::max(level) < halvings_max) {
     const auto next = scene::coarser_level(*lattice, std::nullopt, level, 1);
     if (next == level) break;
     level = next;
