@@ -144,14 +144,15 @@ class Interrupted(unittest.TestCase):
         self.assert_same(whole, store)
 
     def test_memory_of_all_processes_stays_within_the_limit(self):
-        sides = (1024, 1024, 1024)
+        sides = (1024, 1024, 320)  # five times the limit
         document = {"windsplat": "raw", "file": "large.raw", "dims": dict(zip("xyz", sides)),
                     "type": "float32", "endian": "little", "fields": [{"name": "q"}]}
         source = self.folder / "large.json"
         source.write_text(json.dumps(document))
         with open(self.folder / "large.raw", "wb") as file:
-            file.truncate(4 * sides[0] * sides[1] * sides[2])
-            for place in (0, 12345678, (4 << 30) - 4):
+            size = 4 * sides[0] * sides[1] * sides[2]
+            file.truncate(size)
+            for place in (0, 12345678, size - 4):
                 file.seek(place // 4 * 4)
                 file.write(np.float32(3).tobytes())
         process = subprocess.Popen(
