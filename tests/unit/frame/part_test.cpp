@@ -17,6 +17,7 @@
 #include "server/engine/reference/reference.hpp"
 #include "server/frame/cost.hpp"
 #include "server/frame/drawn_samples.hpp"
+#include "server/frame/empty_picture.hpp"
 #include "server/frame/pick/pick.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/level/choice.hpp"
@@ -390,6 +391,7 @@ TEST(Part, StridesWithoutASmallCommonMultipleTakeWholeAxes) {
   protocol::View view = of_one_voxel();
   view.vector.field.name = "wind";
   view.vector.stride = 41;
+  // 8 times their least common multiple exceeds the numbers of an int.
   for (const int stride : {64, 63, 59, 55}) {
     view.scalars->push_back(view.scalars->front());
     view.scalars->back().stride = stride;
@@ -399,6 +401,18 @@ TEST(Part, StridesWithoutASmallCommonMultipleTakeWholeAxes) {
   data::Dataset tight = store(samples_bytes / 2);
   const auto completed = scene::complete(view, tight).value();
   EXPECT_FALSE(scene::part_of(completed, tight).box);
+}
+
+TEST(Part, AnEmptyPictureIsNotExplainedByTheValuesOfAPart) {
+  protocol::View view = of_one_voxel();
+  view.scalars->front().extinction = {{{100.0, 0.0}, {200.0, 20.0}}};
+  const auto why = [&](data::Dataset dataset) {
+    const auto completed = scene::complete(view, dataset).value();
+    const Scene scene = scene::build_scene(completed, dataset).value();
+    return why_empty(scene, completed.view(), {}, engine::WorkReport(), true);
+  };
+  EXPECT_NE(why(store(100 * samples_bytes)).find("at every value of"), std::string::npos);
+  EXPECT_EQ(why(store(samples_bytes / 2)), "the camera does not show the data");
 }
 
 TEST(Part, LightSurfacesAndStreamletsShowTheWhole) {
