@@ -23,156 +23,66 @@
 #include "server/scene/level/choice.hpp"
 #include "server/scene/level/parts.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/stored/stored_fields.hpp"
 
 namespace windsplat::frame {
 namespace {
 
 using data::Coarsening;
-using data::Reduction;
-using data::StoredAs;
-using data::Volume;
 using scene::Scene;
 
 constexpr std::array<int, 3> dims{90, 75, 61};
 constexpr std::uint64_t samples_bytes = std::uint64_t{90} * 75 * 61 * sizeof(float);
 constexpr int levels = 4;
 
-// A cloud and a wind, whose levels are those of coarsen(), on even axes or an uneven vertical one.
-class Store final : public data::Source {
- public:
-  explicit Store(bool uneven) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      data::Axis& axis = info_.grid.axes.at(a);
-      axis.name = "xyz"[a];
-      axis.units = "m";
-      for (int n = 0; n < dims.at(a); ++n) {
-        axis.coordinates.push_back(uneven && a == 2 ? 60.0 * n + n * n : 100.0 * n);
-      }
-    }
-    info_.fields.resize(2);
-    info_.fields[0].name = "cloud";
-    info_.fields[0].components = {"cloud"};
-    info_.fields[1].name = "wind";
-    info_.fields[1].kind = data::FieldKind::vector;
-    info_.fields[1].components = {"u", "v", "w"};
-    for (data::FieldInfo& field : info_.fields) field.box_chunk = {16, 16, 16};
-    info_.steps.resize(1);
-    data::StoredLevels stored;
-    for (int h = 0; h < levels; ++h) stored.levels.push_back({h, h, h});
-    if (uneven) stored.widths[2] = widths(2);
-    stored.fields.resize(2);
-    for (std::size_t f = 0; f < 2; ++f) {
-      stored.fields[f].has_levels = true;
-      stored.fields[f].ranges.push_back({made(f).range, made(f).masked});
-    }
-    stored.fields[1].strided = levels - 1;
-    info_.stored = std::make_shared<const data::StoredLevels>(std::move(stored));
-  }
-  [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
-  Result<Volume> read(std::size_t field, std::size_t /*step*/) override { return made(field); }
-  Result<Volume> read_part(std::size_t field, std::size_t /*step*/,
-                           const data::StoredPart& part) override {
-    if (auto fine = check_part(field, part); !fine) return fine.error();
-    if (part.as == StoredAs::samples) return cut(made(field), part.box);
-    if (part.as == StoredAs::strided) return cut(middles(made(field), part.level), part.box);
-    Coarsening how;
-    how.halvings.fill(static_cast<int>(part.level));
-    for (std::size_t a = 0; a < 3; ++a) how.widths.at(a) = widths(a);
-    how.reduction = part.as == StoredAs::drawn ? Reduction::drawn : Reduction::two_values;
-    const Volume level = coarsen(made(field), how);
-    if (part.as == StoredAs::drawn) return cut(level, part.box);
-    return two_values(level, part.box, made(field).range);
-  }
-
- private:
-  [[nodiscard]] std::vector<double> widths(std::size_t a) const {
-    const auto& at = info_.grid.axes.at(a).coordinates;
-    std::vector<double> out;
-    for (std::size_t n = 0; n < at.size(); ++n) {
-      const double low = n == 0 ? at[0] - (at[1] - at[0]) / 2 : (at[n - 1] + at[n]) / 2;
-      const double high =
-          n + 1 == at.size() ? at[n] + (at[n] - at[n - 1]) / 2 : (at[n] + at[n + 1]) / 2;
-      out.push_back(high - low);
-    }
-    return out;
-  }
-
-  // cut() of the four components, which are no vector.
-  static Volume two_values(const Volume& level, const data::Box& box,
-                           const std::array<float, 2>& range) {
-    Volume out;
-    out.dims = box.count;
-    out.components = level.components;
-    std::vector<float> values;
-    for (int c = 0; c < level.components; ++c) {
-      Volume one;
-      one.dims = level.dims;
-      one.values = std::vector<float>(level.component(c), level.component(c) + level.samples());
-      const Volume part = cut(one, box);
-      values.insert(values.end(), part.values.data(), part.values.data() + part.samples());
-      out.masked = part.masked;
-    }
-    out.values = std::move(values);
-    out.range = range;
-    return out;
-  }
-
-  static Volume middles(const Volume& fine, std::size_t level) {
-    const int stride = 1 << level;
-    Volume out;
-    out.components = fine.components;
-    for (std::size_t a = 0; a < 3; ++a) out.dims[a] = (fine.dims[a] + stride - 1) / stride;
-    std::vector<float> values;
-    for (int c = 0; c < fine.components; ++c) {
-      for (int k = 0; k < out.dims[2]; ++k) {
-        for (int j = 0; j < out.dims[1]; ++j) {
-          for (int i = 0; i < out.dims[0]; ++i) {
-            const int x = data::strided_sample(i, stride, fine.dims[0]);
-            const int y = data::strided_sample(j, stride, fine.dims[1]);
-            const int z = data::strided_sample(k, stride, fine.dims[2]);
-            values.push_back(fine.component(c)[(z * fine.dims[1] + y) * fine.dims[0] + x]);
-          }
+// With a hole, in every component.
+data::Volume made(int components) {
+  data::Volume out;
+  out.dims = dims;
+  out.components = components;
+  std::vector<float> values;
+  for (int c = 0; c < components; ++c) {
+    for (int k = 0; k < dims[2]; ++k) {
+      for (int j = 0; j < dims[1]; ++j) {
+        for (int i = 0; i < dims[0]; ++i) {
+          const bool hole = i / 20 == 1 && j / 20 == 1 && k / 20 == 1;
+          const double wave = std::sin(0.9 * i + c) + std::sin(1.1 * j) * std::cos(0.7 * k);
+          const double value = components == 1 ? std::abs(wave) : wave;
+          values.push_back(hole ? NAN : static_cast<float>(value));
         }
       }
     }
-    out.values = std::move(values);
-    finish_volume(out);
-    return out;
   }
+  out.values = std::move(values);
+  finish_volume(out);
+  return out;
+}
 
-  // With a hole, in every component.
-  static const Volume& made(std::size_t field) {
-    static const std::array<Volume, 2> volumes = [] {
-      std::array<Volume, 2> all;
-      for (std::size_t f = 0; f < 2; ++f) {
-        Volume& out = all.at(f);
-        out.dims = dims;
-        out.components = f == 0 ? 1 : 3;
-        std::vector<float> values;
-        for (int c = 0; c < out.components; ++c) {
-          for (int k = 0; k < dims[2]; ++k) {
-            for (int j = 0; j < dims[1]; ++j) {
-              for (int i = 0; i < dims[0]; ++i) {
-                const bool hole = i / 20 == 1 && j / 20 == 1 && k / 20 == 1;
-                const double wave = std::sin(0.9 * i + c) + std::sin(1.1 * j) * std::cos(0.7 * k);
-                values.push_back(hole ? NAN : static_cast<float>(f == 0 ? std::abs(wave) : wave));
-              }
-            }
-          }
-        }
-        out.values = std::move(values);
-        finish_volume(out);
-      }
-      return all;
-    }();
-    return volumes.at(field);
+// A cloud and a wind, on even axes or an uneven vertical one.
+std::unique_ptr<data::Source> cloud_and_wind(bool uneven) {
+  static const auto cloud = std::make_shared<const data::Volume>(made(1));
+  static const auto wind = std::make_shared<const data::Volume>(made(3));
+  data::DatasetInfo info;
+  for (std::size_t a = 0; a < 3; ++a) {
+    data::Axis& axis = info.grid.axes.at(a);
+    axis.name = "xyz"[a];
+    axis.units = "m";
+    for (int n = 0; n < dims.at(a); ++n) {
+      axis.coordinates.push_back(uneven && a == 2 ? 60.0 * n + n * n : 100.0 * n);
+    }
   }
-
-  data::DatasetInfo info_;
-};
+  info.fields.resize(2);
+  info.fields[0].name = "cloud";
+  info.fields[0].components = {"cloud"};
+  info.fields[1].name = "wind";
+  info.fields[1].kind = data::FieldKind::vector;
+  info.fields[1].components = {"u", "v", "w"};
+  info.steps.resize(1);
+  return test::stored_fields(std::move(info), {cloud, wind}, levels);
+}
 
 data::Dataset store(std::uint64_t bytes, bool uneven = false) {
-  return {std::make_unique<Store>(uneven), "store", bytes};
+  return {cloud_and_wind(uneven), "store", bytes};
 }
 
 class Random {
