@@ -82,6 +82,7 @@ Json frame_info_json(const FrameInfo& info) {
   if (info.detail) {
     out["detail"] = {{"wanted", level_part_json(info.detail->wanted)},
                      {"drawn", level_part_json(info.detail->drawn)}};
+    if (info.detail->error) out["detail"]["error"] = *info.detail->error;
   }
   if (!info.empty.empty()) out["empty"] = info.empty;
   return out;

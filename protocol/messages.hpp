@@ -159,6 +159,9 @@ struct LevelPart {
 };
 struct DetailReport {
   LevelPart wanted, drawn;
+  // Part of the picture's error that a coarser level than wanted is the cause of; absent in JSON:
+  // it is not coarser, or the error is not known.
+  std::optional<double> error;
 };
 struct FrameInfo {
   std::string method = "kernel";

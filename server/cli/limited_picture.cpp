@@ -13,6 +13,7 @@
 #include "server/frame/content.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/frame/measure.hpp"
+#include "server/frame/report/detail.hpp"
 #include "server/quality/pick.hpp"
 #include "server/quality/setting.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
@@ -167,19 +168,15 @@ std::string report_line(const Picture& picture) {
 
 std::string coarser_level_of(const Picture& picture) {
   const auto& detail = picture.frame.data_drawn;
-  if (!detail) return "";
+  if (!frame::lacks_detail(detail)) return "";
   const auto& drawn = detail->drawn.halvings;
   const auto& wanted = detail->wanted.halvings;
-  bool is_coarser = false;
-  for (std::size_t a = 0; a < 3; ++a) is_coarser = is_coarser || drawn[a] > wanted[a];
-  if (!is_coarser) return "";
   const auto text_of = [](const std::array<int, 3>& halvings) {
     return std::to_string(halvings[0]) + ',' + std::to_string(halvings[1]) + ',' +
            std::to_string(halvings[2]);
   };
   return "the data are drawn with their axes halved " + text_of(drawn) + " times, where " +
-         text_of(wanted) +
-         " would suffice: more does not fit into --memory-limit; the error does not include that";
+         text_of(wanted) + " would suffice: more does not fit into --memory-limit";
 }
 
 std::string exceeded_limits(const Picture& picture) {

@@ -17,6 +17,7 @@
 #include "server/frame/empty_picture.hpp"
 #include "server/frame/measure.hpp"
 #include "server/frame/pick/hidden.hpp"
+#include "server/frame/report/detail.hpp"
 #include "server/image/decode.hpp"
 #include "server/image/video_encoder.hpp"
 #include "server/quality/setting.hpp"
@@ -163,13 +164,6 @@ quality::Halvings halvings_of(const Prepared& prepared, const data::Dataset& dat
   return out;
 }
 
-std::optional<protocol::DetailReport> data_drawn(const scene::Scene& scene) {
-  if (!scene.wanted_level) return std::nullopt;
-  protocol::DetailReport out{{*scene.wanted_level, {}}, {scene.level, {}}};
-  if (const auto& part = scene.lattice.part) out.drawn.box = std::array{part->first, part->count};
-  return out;
-}
-
 Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& pool,
                                         const CancelToken& cancel, Workspace& workspace) {
   const scene::Scene& scene = prepared.scene;
@@ -187,13 +181,14 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
     if (work && jpeg) put_in_strips(picture, pool, workspace);
     return work;
   }
-  const bool measured = is_measured(prepared);
+  // Whether the pixels are compared with those of other pictures.
+  const bool kept = is_measured(prepared) || !prepared.compared.empty();
   const auto to_planes = [&workspace](const engine::TilePixels& tile) {
     put_part(workspace, {tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
   };
-  auto work = jpeg && !measured ? engine::render(scene, pool, cancel, workspace.space, to_planes)
-                                : engine::render(scene, pool, cancel, workspace.space);
-  if (work && jpeg && measured) put_in_strips(picture, pool, workspace);
+  auto work = jpeg && !kept ? engine::render(scene, pool, cancel, workspace.space, to_planes)
+                            : engine::render(scene, pool, cancel, workspace.space);
+  if (work && jpeg && kept) put_in_strips(picture, pool, workspace);
   if (work) work->variant.level = scene.level;
   return work;
 }
@@ -356,6 +351,15 @@ Result<annotate::Figure> make_figure(const scene::CompletedView& drawn, const sc
   return figure;
 }
 
+// Whether the error of a coarser level than would suffice is found by comparing pictures.
+bool compares_levels(const protocol::View& view, const quality::Setting& setting,
+                     const scene::Scene& scene, const Encoding& encoding) {
+  const bool wanted = encoding.measure || encoding.describe || view.quality.max_error;
+  const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
+  return wanted && setting.half_level == 0 && setting.coarser == 0 &&
+         pixels <= static_cast<double>(retained_pixels) && lacks_detail(data_drawn(scene));
+}
+
 }  // namespace
 
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
@@ -371,6 +375,12 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
     if (!made) return made.error();
     figure = std::move(*made);
   }
+  std::vector<scene::Scene> compared;
+  if (compares_levels(drawn->view(), setting, *scene, encoding)) {
+    auto scenes = scenes_to_compare(*drawn, *scene, dataset);
+    if (!scenes) return with_need(scenes.error(), completed.view(), dataset);
+    compared = std::move(*scenes);
+  }
   return Prepared{std::move(*drawn),
                   completed.view().image,
                   std::move(*scene),
@@ -378,7 +388,8 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
                   encoding,
                   std::move(figure),
                   microseconds(start, Clock::now()),
-                  {}};
+                  {},
+                  std::move(compared)};
 }
 
 Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
@@ -423,6 +434,13 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
       return given_up(make_error(ErrorKind::cancelled, "description cancelled"), workspace);
     }
     drawn.describe_us = std::max<std::int64_t>(microseconds(described_from, Clock::now()), 1);
+  }
+  if (!drawn.error && drawn.content && !drawn.content->detail) {
+    const Clock::time_point compared_from = Clock::now();
+    auto error = detail_error(prepared, dataset, pool, cancel, workspace);
+    if (!error) return given_up(error.error(), workspace);
+    drawn.content->detail = *error;
+    if (*error) drawn.describe_us += microseconds(compared_from, Clock::now());
   }
   drawn.measure_us = microseconds(measured_from, Clock::now());
   return {};

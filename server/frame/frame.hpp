@@ -147,6 +147,7 @@ struct Prepared {
   std::optional<annotate::Figure> figure;  // empty: the picture shows no annotations
   std::int64_t prepare_us = 0;             // time of completing and preparing, counted in render_us
   std::optional<quality::Content> content;  // of the view, if it is known already
+  std::vector<scene::Scene> compared;       // for detail_error() (report/detail.hpp)
 };
 // The search for places of numbers on contours ends with dataset.cancellation(). Errors: those of
 // the scene; out_of_memory, cancelled.

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "server/quality/detail_error.hpp"
+
 namespace windsplat::quality {
 
 // Distances across a ray at which the light of the medium is compared, in cells and in heights of
@@ -50,6 +52,8 @@ struct Content {
   std::optional<Trials> trials = std::nullopt;
   // Mean over the picture of its change by what tolerances leave out, at some of its pixels.
   std::optional<double> skipped_change = std::nullopt;
+  // Of a picture from a coarser level than would suffice.
+  std::optional<DetailError> detail = std::nullopt;
 };
 
 // A quantity at any distance: powers of it between those known, beyond them constant, and below

@@ -326,6 +326,19 @@ std::optional<Content> Table::content(const Viewpoint& viewpoint) const {
   return known->content;
 }
 
+std::optional<DetailError> Table::detail(const Viewpoint& viewpoint) const {
+  const Viewpoint* nearest = nullptr;
+  double apart = 0;
+  for (const Viewpoint& known : described_) {
+    if (!known.content->detail) continue;
+    const double its = is_same_view(known, viewpoint) ? -1 : distance(known, viewpoint);
+    if (nearest != nullptr && its >= apart) continue;
+    nearest = &known;
+    apart = its;
+  }
+  return nearest != nullptr ? nearest->content->detail : std::nullopt;
+}
+
 bool Table::begin_try() {
   constexpr int frames_least = 100;
   if (frames_since_try_ < frames_least) return false;

@@ -53,8 +53,12 @@ class Table {
   void describe(const Viewpoint& viewpoint);
   // The content of this very view; empty: not described, or too long ago.
   [[nodiscard]] std::optional<Content> content(const Viewpoint& viewpoint) const;
+  // The error of a level coarser than would suffice, of this view or the nearest one of which it is
+  // known; empty: of none.
+  [[nodiscard]] std::optional<DetailError> detail(const Viewpoint& viewpoint) const;
 
-  // Forecasts of all settings. Times without measurements are estimated from those with.
+  // Forecasts of all settings, without the error of a coarser level than would suffice. Times
+  // without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
   // The prior corrected by measurements: simple kriging of the logarithms of measured over expected
   // values. Errors correlate with those of other settings too, most if they have the same cause,

@@ -67,6 +67,13 @@ std::optional<Content> Tables::content(const SceneSignature& signature,
   return known != nullptr ? known->content(viewpoint) : std::nullopt;
 }
 
+std::optional<DetailError> Tables::detail(const SceneSignature& signature,
+                                          const Viewpoint& viewpoint) {
+  const std::lock_guard lock(mutex_);
+  const Table* const known = signature.key.empty() ? nullptr : find(signature);
+  return known != nullptr ? known->detail(viewpoint) : std::nullopt;
+}
+
 void Tables::add_frame(const SceneSignature& signature, std::size_t setting,
                        const Viewpoint& viewpoint, double ms) {
   if (signature.key.empty()) return;

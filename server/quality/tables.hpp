@@ -25,9 +25,10 @@ class Tables {
   void add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
            const Measured& measured);
 
-  // See Table::describe and Table::content.
+  // See Table::describe, Table::content and Table::detail.
   void describe(const SceneSignature& signature, const Viewpoint& viewpoint);
   std::optional<Content> content(const SceneSignature& signature, const Viewpoint& viewpoint);
+  std::optional<DetailError> detail(const SceneSignature& signature, const Viewpoint& viewpoint);
 
   // The time of a frame of a session, see Table::add_frame.
   void add_frame(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,

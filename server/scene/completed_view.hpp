@@ -1,6 +1,7 @@
 // A view with all defaults of its dataset filled in. Only completed views are drawn.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -42,6 +43,13 @@ class CompletedView {
     changed.coarser_ = times;
     return changed;
   }
+  // The level of the data is at least as coarse as this one, of a dataset with stored levels.
+  [[nodiscard]] const std::array<int, 3>& least_level() const { return least_level_; }
+  [[nodiscard]] CompletedView no_finer_than(const std::array<int, 3>& halvings) const {
+    CompletedView changed = *this;
+    changed.least_level_ = halvings;
+    return changed;
+  }
 
  private:
   friend Result<CompletedView> complete(const protocol::View& view, data::Dataset& dataset);
@@ -53,6 +61,7 @@ class CompletedView {
   std::shared_ptr<const Placed> placed_;
   Camera camera_;
   int coarser_ = 0;
+  std::array<int, 3> least_level_{0, 0, 0};
 };
 
 // Fills in all defaults; values given by the view are kept. Loads only the data needed for ranges

@@ -2,6 +2,10 @@
 #include "server/tasks/error_report.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "server/frame/report/detail.hpp"
 
 namespace windsplat::tasks {
 namespace {
@@ -15,6 +19,32 @@ void estimate_skipped_change(const frame::Frame& drawn, const Observation& obser
   if (!content || !content->skipped_change) return;
   info.skipped_change = std::min(*content->skipped_change, drawn.work.skipped_bound);
   info.skipped_change_kind = "estimated";
+}
+
+// Of a picture from a coarser level than would suffice; empty: of any other, or not known.
+std::optional<double> detail_error_of(const frame::Frame& drawn, const Observation& observed,
+                                      quality::Tables& tables) {
+  if (!frame::lacks_detail(drawn.data_drawn)) return std::nullopt;
+  const bool own = drawn.content && drawn.content->detail;
+  const auto known =
+      own ? drawn.content->detail : tables.detail(observed.signature, observed.viewpoint);
+  if (!known) return std::nullopt;
+  return quality::error_at(*known, drawn.data_drawn->drawn.halvings);
+}
+
+// Of the method, the size of the picture and the detail that is not drawn; their errors are
+// independent. Unknown if that of the detail is.
+void estimate_error(const frame::Frame& drawn, const Observation& observed,
+                    const quality::Setting& setting, quality::Tables& tables,
+                    protocol::FrameInfo& info) {
+  double error = tables.forecast(observed.signature, setting, observed.viewpoint).error;
+  if (frame::lacks_detail(drawn.data_drawn)) {
+    info.detail->error = detail_error_of(drawn, observed, tables);
+    if (!info.detail->error) return;
+    error = std::min(1.0, std::hypot(error, *info.detail->error));
+  }
+  info.error_value = error;
+  info.error_kind = "estimated";
 }
 
 }  // namespace
@@ -48,8 +78,7 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
     if (index)
       tables.add(observed.signature, *index, observed.viewpoint, {drawn.error, std::nullopt});
   } else if (quality::neighbours_of(setting)) {
-    info.error_value = tables.forecast(observed.signature, setting, observed.viewpoint).error;
-    info.error_kind = "estimated";
+    estimate_error(drawn, observed, setting, tables, info);
   }
   if (encoding.format != frame::Format::jpeg) return;
   const bool full_chroma = encoding.subsampling == image::Subsampling::s444;

@@ -70,10 +70,11 @@ std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) 
 bool keeps_part(const View& view) { return is_cropped(view.region) || !view.region.where.empty(); }
 
 // Whether the levels of all fields fit into memory beside the largest volume from which one is
-// reduced, and what a region keeps of it; a stored level is not reduced. It depends on sizes alone,
-// so that a view has the same level whatever is resident.
+// reduced, what a region keeps of it, and `beside` other bytes; a stored level is not reduced. It
+// depends on sizes alone, so that a view has the same level whatever is resident.
 bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
-                      const Lattice& lattice, const data::Dataset& dataset) {
+                      const Lattice& lattice, const data::Dataset& dataset,
+                      std::uint64_t beside = 0) {
   const bool kept = keeps_part(view);
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
@@ -88,7 +89,7 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
   }
   // Of a loader that reads chunks of a level.
   const std::uint64_t reading = dataset.info().stored ? std::uint64_t{8} << 20 : 0;
-  return dataset.is_within_limit(levels + largest + reading);
+  return dataset.is_within_limit(levels + largest + reading + beside);
 }
 
 // Whether every sample of all fields fits into memory.
@@ -124,8 +125,8 @@ bool may_merge(const View& view) {
 class Choice {
  public:
   Choice(const View& view, const Camera& camera, const Lattice& lattice,
-         const data::Dataset& dataset)
-      : view_(view), camera_(camera), lattice_(lattice), dataset_(dataset) {}
+         const data::Dataset& dataset, const std::array<int, 3>& least = {0, 0, 0})
+      : view_(view), camera_(camera), lattice_(lattice), dataset_(dataset), least_(least) {}
 
   // The fraction of the requested detail that the picture can show. If there is memory for the
   // volumes but not for their levels, every sample is drawn; if there is not, what is in sight, or
@@ -136,7 +137,7 @@ class Choice {
     if (!is_drawn_in_full(view_)) {
       const auto slice = slice_of(view_.geometry, lattice_);
       level = choose_level(camera_, lattice_, slice, merge_limits(view_));
-      level = coarser_level(lattice_, slice, level, coarser);
+      level = no_finer(coarser_level(lattice_, slice, level, coarser));
       if (level != full && fits(level)) return {level, std::nullopt, level};
     }
     const DrawnPart all{full, std::nullopt, level};
@@ -149,13 +150,33 @@ class Choice {
         for (int& h : level) ++h;
       }
     }
-    return stored(level);
+    return stored(no_finer(level));
   }
 
  private:
-  [[nodiscard]] bool fits(const std::array<int, 3>& level) const {
+  [[nodiscard]] std::array<int, 3> no_finer(std::array<int, 3> level) const {
+    for (std::size_t a = 0; a < 3; ++a) level[a] = std::max(level[a], least_[a]);
+    return level;
+  }
+
+  [[nodiscard]] bool fits(const std::array<int, 3>& level, std::uint64_t beside = 0) const {
     const auto shown = shown_at(view_, coarsening_of(lattice_, level));
-    return are_within_limit(shown, view_, lattice_, dataset_);
+    return are_within_limit(shown, view_, lattice_, dataset_, beside);
+  }
+
+  // What comparing a picture of a level coarser than wanted with the next two takes
+  // (frame/report/detail).
+  [[nodiscard]] std::uint64_t compared_bytes(std::size_t n,
+                                             const std::array<int, 3>& wanted) const {
+    const auto& levels = dataset_.info().stored->levels;
+    if (levels[n] == wanted) return 0;
+    std::uint64_t bytes = bytes_to_compare(camera_);
+    for (std::size_t m = n + 1; m < std::min(n + 3, levels.size()); ++m) {
+      for (const auto& [field, how] : shown_at(view_, coarsening_of(lattice_, levels[m]))) {
+        bytes += level_bytes(lattice_, dataset_.info().find(field)->components.size(), how);
+      }
+    }
+    return bytes;
   }
 
   [[nodiscard]] std::optional<data::Box> box(const std::array<int, 3>& level) const {
@@ -176,7 +197,9 @@ class Choice {
     while (n + 1 < levels.size() && is_allowed(levels[n + 1])) ++n;
     const std::array<int, 3> wanted = levels[n];
     for (; n < levels.size(); ++n) {
-      if (n > 0 && fits(levels[n])) return {levels[n], std::nullopt, wanted};
+      if (n > 0 && fits(levels[n], compared_bytes(n, wanted))) {
+        return {levels[n], std::nullopt, wanted};
+      }
       if (auto of_level = box(levels[n])) return {levels[n], of_level, wanted};
     }
     // Lines that are not stored at coarser levels.
@@ -188,12 +211,14 @@ class Choice {
   const Camera& camera_;
   const Lattice& lattice_;
   const data::Dataset& dataset_;
+  const std::array<int, 3> least_;  // halvings of a level
 };
 
 }  // namespace
 
 DrawnPart part_of(const CompletedView& completed, const data::Dataset& dataset) {
-  return Choice(completed.view(), completed.camera(), completed.lattice(), dataset)
+  return Choice(completed.view(), completed.camera(), completed.lattice(), dataset,
+                completed.least_level())
       .part(completed.coarser());
 }
 

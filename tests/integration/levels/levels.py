@@ -197,13 +197,34 @@ class Levels(unittest.TestCase):
                 parts += 1
         self.assertGreaterEqual(parts, 10)
 
+    WHOLE_CLOUD = {"vector": {"field": None}, "method": {"name": "kernel"},
+                   "scalars": [{"field": "cloud", "color": {"range": [0, 1e-3]},
+                                "extinction": [[0, 0.1], [1e-3, 40]]}],
+                   "image": {"width": 640, "height": 480},
+                   "camera": {"projection": "orthographic", "eye": [0, -2, 0],
+                              "target": [0, 0, 0], "height": 1}}
+
+    def test_the_error_of_a_coarser_level_contains_what_finer_ones_would_change(self):
+        whirl = {"field": "wind", "length": 0.03, "magnitudeRange": [0, 20], "stride": 1,
+                 "minMagnitude": 0, "color": {"by": "worldZ", "range": [-1, 1]}}
+        # Coarser levels do not tell of the cloud's noise, which is another at each sample.
+        for more, least in (({}, 0.2), ({"vector": whirl, "scalars": []}, 0.5)):
+            view = {**self.WHOLE_CLOUD, **more}
+            coarse, fine = (self.picture(where, {**view, "dataset": name}, "application/x-npy")
+                            for where, name in ((self.tight, "large_store"),
+                                                (self.roomy, "large")))
+            found, wanted = (np.load(io.BytesIO(one.body)).astype("f8") for one in (coarse, fine))
+            error = np.sqrt(np.mean((found - wanted)**2))
+            told = json.loads(coarse.headers["Windsplat-Frame"])
+            self.assertNotEqual(told["detail"]["drawn"], told["detail"]["wanted"])
+            self.assertEqual(told["error"]["kind"], "estimated")
+            self.assertGreater(told["error"]["value"], least * error)
+            self.assertLess(told["error"]["value"], 2 * error)
+            self.assertLessEqual(told["detail"]["error"], told["error"]["value"])
+            self.assertNotIn("error", json.loads(fine.headers["Windsplat-Frame"]).get("detail", {}))
+
     def test_render_says_that_a_coarser_level_is_drawn_than_would_suffice(self):
-        view = {"vector": {"field": None}, "method": {"name": "kernel"},
-                "scalars": [{"field": "cloud", "color": {"range": [0, 1e-3]},
-                             "extinction": [[0, 0.1], [1e-3, 40]]}],
-                "image": {"width": 640, "height": 480},
-                "camera": {"projection": "orthographic", "eye": [0, -2, 0], "target": [0, 0, 0],
-                           "height": 1}}
+        view = self.WHOLE_CLOUD
         folder = pathlib.Path(self.folder.name)
         (folder / "view.json").write_text(json.dumps(view))
         said = {}
@@ -213,6 +234,13 @@ class Levels(unittest.TestCase):
                  "--memory-limit", limit, "-o", folder / "render.png"],
                 capture_output=True, text=True, check=True)
             said[limit] = done.stderr
+            done = subprocess.run(
+                [PROGRAM, "animate", folder / "large_store.zarr", "--view", folder / "view.json",
+                 "--memory-limit", limit, "--turn", "10", "--frames", "2",
+                 "-o", folder / "turn_%d.png"],
+                capture_output=True, text=True, check=True)
+            self.assertEqual("2 pictures lack detail; of the first" in done.stderr,
+                             limit == f"{LIMIT}M", done.stderr)
         self.assertIn("where 0,0,0 would suffice", said[f"{LIMIT}M"])
         self.assertNotIn("would suffice", said["1500M"])
 

@@ -194,6 +194,19 @@ TEST(Table, DescribingAViewLeavesThoseBesideItAsTheyAre) {
   EXPECT_FALSE(table.content(seen)) << "no more are kept";
 }
 
+TEST(Table, TheErrorOfDetailIsThatOfThisViewOrTheNearestWithOne) {
+  Table table(kind);
+  EXPECT_FALSE(table.detail(sight_at(0)));
+  for (const double steps : {1.0, 3.0}) {
+    Viewpoint seen = sight_at(steps);
+    seen.content->detail = DetailError{0.01 * steps, 2, {1, 1, 1}};
+    table.describe(seen);
+  }
+  table.describe(sight_at(0));  // without one
+  EXPECT_DOUBLE_EQ(table.detail(sight_at(0))->error, 0.01);
+  EXPECT_DOUBLE_EQ(table.detail(sight_at(3))->error, 0.03);
+}
+
 // Measured of another view whose content is a guess: what the guess leaves out is not an error of
 // the law.
 TEST(Table, AMeasurementOfGuessedContentCorrectsKnownContentLess) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "server/frame/frame_info.hpp"
 
 namespace windsplat::tasks {
@@ -73,6 +75,46 @@ TEST_F(ErrorReport, ErrorAskedIsTheViewsMaxErrorButNotOfAReference) {
   drawn.view.method.name = protocol::MethodName::reference;
   const auto info = reported();
   EXPECT_FALSE(info.error_asked || info.error_value || info.skipped_change);
+}
+
+protocol::DetailReport drawn_from(int level, int wanted) {
+  protocol::DetailReport out;
+  out.wanted.halvings.fill(wanted);
+  out.drawn.halvings.fill(level);
+  return out;
+}
+
+TEST_F(ErrorReport, ACoarserLevelThanWouldSufficeAddsItsErrorInSquares) {
+  drawn.content.emplace();
+  const double method = *reported().error_value;
+  drawn.content->detail = quality::DetailError{3 * method, 2, {2, 2, 2}};
+  drawn.data_drawn = drawn_from(2, 0);
+  const auto info = reported();
+  EXPECT_DOUBLE_EQ(*info.error_value, std::sqrt(10.0) * method);
+  EXPECT_EQ(info.error_kind, "estimated");
+  EXPECT_DOUBLE_EQ(*info.detail->error, 3 * method);
+  drawn.data_drawn = drawn_from(0, 0);
+  EXPECT_EQ(reported().error_value, method);
+  EXPECT_FALSE(reported().detail->error);
+}
+
+TEST_F(ErrorReport, WithoutThatOfItsLevelTheErrorOfACoarserOneIsUnknown) {
+  drawn.content.emplace();
+  drawn.data_drawn = drawn_from(1, 0);
+  const auto info = reported();
+  EXPECT_FALSE(info.error_value);
+  EXPECT_EQ(info.error_kind, "none");
+}
+
+TEST_F(ErrorReport, AFrameOfAnotherLevelHasTheErrorOfTheDescribedOneGrown) {
+  drawn.content.emplace().detail = quality::DetailError{0.02, 2, {1, 1, 1}};
+  drawn.data_drawn = drawn_from(1, 0);
+  drawn.describe_us = 1;
+  EXPECT_EQ(reported().detail->error, 0.02);
+  drawn.content.reset();
+  drawn.describe_us = 0;
+  drawn.data_drawn = drawn_from(3, 0);
+  EXPECT_DOUBLE_EQ(*reported().detail->error, 0.08);
 }
 
 }  // namespace
