@@ -39,6 +39,8 @@ struct Reports {
   std::string first_empty;    // why the first of them does
   int lacking = 0;            // pictures that show something, but not all surfaces
   std::string first_lacking;  // why the first of them does not
+  int coarser = 0;            // pictures from a coarser level of the data than would suffice
+  std::string first_coarser;  // which, of the first of them
 };
 
 Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& sheets,
@@ -78,6 +80,7 @@ Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& s
     if (!sheet->empty_surfaces.empty() && reports.lacking++ == 0) {
       reports.first_lacking = sheet->empty_surfaces;
     }
+    if (!sheet->coarser.empty() && reports.coarser++ == 0) reports.first_coarser = sheet->coarser;
     reports.lines += sheet->reports;
   }
   progress.show(1, "writing");
@@ -98,6 +101,10 @@ void note_remarks(const Reports& reports) {
   if (reports.lacking > 0) {
     note("a surface is empty in " + std::to_string(reports.lacking) +
          " pictures; in the first: " + reports.first_lacking);
+  }
+  if (reports.coarser > 0) {
+    note(std::to_string(reports.coarser) + " pictures lack detail; of the first " +
+         reports.first_coarser);
   }
 }
 
