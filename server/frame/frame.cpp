@@ -352,9 +352,9 @@ Result<annotate::Figure> make_figure(const scene::CompletedView& drawn, const sc
 }
 
 // Whether the error of a coarser level than would suffice is found by comparing pictures.
-bool compares_levels(const protocol::View& view, const quality::Setting& setting,
-                     const scene::Scene& scene, const Encoding& encoding) {
-  const bool wanted = encoding.measure || encoding.describe || view.quality.max_error;
+bool compares_levels(const quality::Setting& setting, const scene::Scene& scene,
+                     const Encoding& encoding) {
+  const bool wanted = encoding.measure || encoding.describe || encoding.compare_levels;
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   return wanted && setting.half_level == 0 && setting.coarser == 0 &&
          pixels <= static_cast<double>(retained_pixels) && lacks_detail(data_drawn(scene));
@@ -376,7 +376,7 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
     figure = std::move(*made);
   }
   std::vector<scene::Scene> compared;
-  if (compares_levels(drawn->view(), setting, *scene, encoding)) {
+  if (compares_levels(setting, *scene, encoding)) {
     auto scenes = scenes_to_compare(*drawn, *scene, dataset);
     if (!scenes) return with_need(scenes.error(), completed.view(), dataset);
     compared = std::move(*scenes);

@@ -58,6 +58,9 @@ struct Encoding {
   // 50 ms, so pictures with a measured error, which do not need it, are described only if this is
   // set. One of which the error should be measured and cannot be is described in any case.
   bool describe = false;
+  // Whether the error of a coarser level than would suffice is found (report/detail.hpp), as for
+  // pictures that are measured or described, of a view that was described before it is drawn.
+  bool compare_levels = false;
   // Encodes a JPEG of 4:2:0 that is not measured as the next picture of this stream instead, a key
   // one if `key` is set; if that fails, as JPEG.
   image::VideoEncoder* video = nullptr;

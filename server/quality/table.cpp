@@ -14,7 +14,8 @@ namespace windsplat::quality {
 namespace {
 
 constexpr double ms_least = 1e-3;
-constexpr double near = 0.5;  // distance below which a calibration run adds no information
+constexpr double near = 0.5;       // distance below which a calibration run adds no information
+constexpr double told_within = 1;  // distance beyond which the error of a level tells nothing
 constexpr std::size_t nearest_max = 8;
 // Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
 // slabs (the residuals of the laws over the generated family).
@@ -332,7 +333,7 @@ std::optional<DetailError> Table::detail(const Viewpoint& viewpoint) const {
   for (const Viewpoint& known : described_) {
     if (!known.content->detail) continue;
     const double its = is_same_view(known, viewpoint) ? -1 : distance(known, viewpoint);
-    if (nearest != nullptr && its >= apart) continue;
+    if (its >= (nearest != nullptr ? apart : told_within)) continue;
     nearest = &known;
     apart = its;
   }

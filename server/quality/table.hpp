@@ -54,7 +54,7 @@ class Table {
   // The content of this very view; empty: not described, or too long ago.
   [[nodiscard]] std::optional<Content> content(const Viewpoint& viewpoint) const;
   // The error of a level coarser than would suffice, of this view or the nearest one of which it is
-  // known; empty: of none.
+  // known; empty: of none that is near enough.
   [[nodiscard]] std::optional<DetailError> detail(const Viewpoint& viewpoint) const;
 
   // Forecasts of all settings, without the error of a coarser level than would suffice. Times

@@ -112,6 +112,7 @@ Result<tasks::PreparedPtr> prepare_limited(tasks::Backend& backend,
   const protocol::View& view = completed.view();
   // Not after drawing: the budget does not allow it, or it was done before.
   encoding.describe = false;
+  encoding.compare_levels = !view.quality.budget_ms;
   std::optional<frame::Prepared> own;
   {
     auto prepared = frame::prepare(completed, frame::own_setting(completed), dataset, encoding);

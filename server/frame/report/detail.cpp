@@ -10,7 +10,6 @@
 #include "protocol/view/shown.hpp"
 #include "server/engine/render.hpp"
 #include "server/scene/build.hpp"
-#include "server/scene/level/choice.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -45,6 +44,12 @@ std::int16_t rounded(float value) {
 std::size_t values_of(const scene::Camera& camera) {
   return values_a_pixel * static_cast<std::size_t>(camera.width) *
          static_cast<std::size_t>(camera.height);
+}
+
+// Two pictures, and what is seen of each pixel.
+std::uint64_t bytes_to_compare(const scene::Camera& camera) {
+  constexpr std::uint64_t of_pixel = (2 * values_a_pixel + 1) * sizeof(std::int16_t);
+  return of_pixel * values_of(camera) / values_a_pixel;
 }
 
 // Calls take(index in the picture, value) of every value that is drawn.
@@ -137,9 +142,12 @@ Result<std::vector<scene::Scene>> scenes_to_compare(const scene::CompletedView& 
   for (std::size_t n = 1; n <= compared_levels; ++n) {
     const Level& level = levels[first + n];
     auto built = scene::build_scene(shown->no_finer_than(level), dataset);
-    const bool fits = built || built.error().kind != ErrorKind::out_of_memory;
-    if (fits && !built) return built.error();
-    if (!fits || built->level != level) return std::vector<scene::Scene>();
+    if (!built) {
+      const ErrorKind kind = built.error().kind;
+      if (kind == ErrorKind::not_resident || kind == ErrorKind::cancelled) return built.error();
+      return std::vector<scene::Scene>();
+    }
+    if (built->level != level) return std::vector<scene::Scene>();
     out.push_back(std::move(*built));
   }
   return out;
@@ -153,7 +161,7 @@ Result<std::optional<quality::DetailError>> detail_error(const Prepared& prepare
   using Known = std::optional<quality::DetailError>;
   if (prepared.compared.empty()) return Known();
   const scene::Scene& scene = prepared.scene;
-  const auto held = dataset.reserve(scene::bytes_to_compare(scene.camera));
+  const auto held = dataset.reserve(bytes_to_compare(scene.camera));
   if (!held) return Known();
   Values near;
   Values seen;

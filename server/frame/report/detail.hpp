@@ -25,8 +25,7 @@ bool lacks_detail(const std::optional<protocol::DetailReport>& drawn);
 
 // The scenes of the next two coarser levels, with whose pictures that of the scene is compared, the
 // finer first. They are without lines if the scene has those of full detail, with a stride. Empty
-// if there are not two coarser levels, or no memory for them. Errors: not_resident, cancelled,
-// those of reading.
+// if there are not two coarser levels, or they cannot be read. Errors: not_resident, cancelled.
 Result<std::vector<scene::Scene>> scenes_to_compare(const scene::CompletedView& completed,
                                                     const scene::Scene& scene,
                                                     data::Dataset& dataset);

@@ -70,11 +70,10 @@ std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) 
 bool keeps_part(const View& view) { return is_cropped(view.region) || !view.region.where.empty(); }
 
 // Whether the levels of all fields fit into memory beside the largest volume from which one is
-// reduced, what a region keeps of it, and `beside` other bytes; a stored level is not reduced. It
-// depends on sizes alone, so that a view has the same level whatever is resident.
+// reduced, and what a region keeps of it; a stored level is not reduced. It depends on sizes alone,
+// so that a view has the same level whatever is resident.
 bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
-                      const Lattice& lattice, const data::Dataset& dataset,
-                      std::uint64_t beside = 0) {
+                      const Lattice& lattice, const data::Dataset& dataset) {
   const bool kept = keeps_part(view);
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
@@ -89,7 +88,7 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
   }
   // Of a loader that reads chunks of a level.
   const std::uint64_t reading = dataset.info().stored ? std::uint64_t{8} << 20 : 0;
-  return dataset.is_within_limit(levels + largest + reading + beside);
+  return dataset.is_within_limit(levels + largest + reading);
 }
 
 // Whether every sample of all fields fits into memory.
@@ -159,24 +158,9 @@ class Choice {
     return level;
   }
 
-  [[nodiscard]] bool fits(const std::array<int, 3>& level, std::uint64_t beside = 0) const {
+  [[nodiscard]] bool fits(const std::array<int, 3>& level) const {
     const auto shown = shown_at(view_, coarsening_of(lattice_, level));
-    return are_within_limit(shown, view_, lattice_, dataset_, beside);
-  }
-
-  // What comparing a picture of a level coarser than wanted with the next two takes
-  // (frame/report/detail).
-  [[nodiscard]] std::uint64_t compared_bytes(std::size_t n,
-                                             const std::array<int, 3>& wanted) const {
-    const auto& levels = dataset_.info().stored->levels;
-    if (levels[n] == wanted) return 0;
-    std::uint64_t bytes = bytes_to_compare(camera_);
-    for (std::size_t m = n + 1; m < std::min(n + 3, levels.size()); ++m) {
-      for (const auto& [field, how] : shown_at(view_, coarsening_of(lattice_, levels[m]))) {
-        bytes += level_bytes(lattice_, dataset_.info().find(field)->components.size(), how);
-      }
-    }
-    return bytes;
+    return are_within_limit(shown, view_, lattice_, dataset_);
   }
 
   [[nodiscard]] std::optional<data::Box> box(const std::array<int, 3>& level) const {
@@ -197,9 +181,7 @@ class Choice {
     while (n + 1 < levels.size() && is_allowed(levels[n + 1])) ++n;
     const std::array<int, 3> wanted = levels[n];
     for (; n < levels.size(); ++n) {
-      if (n > 0 && fits(levels[n], compared_bytes(n, wanted))) {
-        return {levels[n], std::nullopt, wanted};
-      }
+      if (n > 0 && fits(levels[n])) return {levels[n], std::nullopt, wanted};
       if (auto of_level = box(levels[n])) return {levels[n], of_level, wanted};
     }
     // Lines that are not stored at coarser levels.

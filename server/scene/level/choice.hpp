@@ -22,11 +22,4 @@ std::uint64_t level_bytes(const Lattice& lattice, std::size_t components,
 // How many samples of a completed view may be merged.
 MergeLimits merge_limits(const protocol::View& view);
 
-// Memory for comparing pictures of three levels (frame/report/detail.hpp), beside their data.
-inline std::uint64_t bytes_to_compare(const Camera& camera) {
-  constexpr std::uint64_t of_pixel = 18;  // two pictures of 8 bytes a pixel, and a mask of 2
-  return of_pixel * static_cast<std::uint64_t>(camera.width) *
-         static_cast<std::uint64_t>(camera.height);
-}
-
 }  // namespace windsplat::scene

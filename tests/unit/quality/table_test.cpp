@@ -197,14 +197,16 @@ TEST(Table, DescribingAViewLeavesThoseBesideItAsTheyAre) {
 TEST(Table, TheErrorOfDetailIsThatOfThisViewOrTheNearestWithOne) {
   Table table(kind);
   EXPECT_FALSE(table.detail(sight_at(0)));
-  for (const double steps : {1.0, 3.0}) {
+  for (const double steps : {0.2, 0.4}) {
     Viewpoint seen = sight_at(steps);
-    seen.content->detail = DetailError{0.01 * steps, 2, {1, 1, 1}};
+    seen.content->detail = DetailError{0.1 * steps, 2, {1, 1, 1}};
     table.describe(seen);
   }
   table.describe(sight_at(0));  // without one
-  EXPECT_DOUBLE_EQ(table.detail(sight_at(0))->error, 0.01);
-  EXPECT_DOUBLE_EQ(table.detail(sight_at(3))->error, 0.03);
+  ASSERT_TRUE(table.detail(sight_at(0)));
+  EXPECT_DOUBLE_EQ(table.detail(sight_at(0))->error, 0.02);
+  EXPECT_DOUBLE_EQ(table.detail(sight_at(0.4))->error, 0.04);
+  EXPECT_FALSE(table.detail(sight_at(9))) << "too far away";
 }
 
 // Measured of another view whose content is a guess: what the guess leaves out is not an error of
