@@ -83,6 +83,9 @@ Json frame_info_json(const FrameInfo& info) {
     out["detail"] = {{"wanted", level_part_json(info.detail->wanted)},
                      {"drawn", level_part_json(info.detail->drawn)}};
     if (info.detail->error) out["detail"]["error"] = *info.detail->error;
+    if (const auto bytes = info.detail->missing_bytes; bytes > 0) {
+      out["detail"]["missingBytes"] = bytes;
+    }
   }
   if (!info.empty.empty()) out["empty"] = info.empty;
   return out;

@@ -162,6 +162,8 @@ struct DetailReport {
   // Part of the picture's error that a coarser level than wanted is the cause of; absent in JSON:
   // it is not coarser, or the error is not known.
   std::optional<double> error;
+  // Of what is wanted and was not in memory, so that coarser data stand in; absent in JSON: 0.
+  std::uint64_t missing_bytes = 0;
 };
 struct FrameInfo {
   std::string method = "kernel";

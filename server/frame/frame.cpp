@@ -363,11 +363,12 @@ bool compares_levels(const quality::Setting& setting, const scene::Scene& scene,
 }  // namespace
 
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
-                         data::Dataset& dataset, const Encoding& encoding) {
+                         data::Dataset& dataset, const Encoding& encoding,
+                         scene::StandIn stand_in) {
   const Clock::time_point start = Clock::now();
   auto drawn = at_setting(completed, setting);
   if (!drawn) return drawn.error();
-  auto scene = scene::build_scene(*drawn, dataset);
+  auto scene = scene::build_scene(*drawn, dataset, stand_in);
   if (!scene) return with_need(scene.error(), completed.view(), dataset);
   std::optional<annotate::Figure> figure;
   if (encoding.format != Format::npy && annotate::any(drawn->view().annotations)) {

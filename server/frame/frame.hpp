@@ -27,6 +27,7 @@
 #include "server/quality/setting.hpp"
 #include "server/quality/sizes.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/level/stand_in.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::image {
@@ -155,7 +156,8 @@ struct Prepared {
 // The search for places of numbers on contours ends with dataset.cancellation(). Errors: those of
 // the scene; out_of_memory, cancelled.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
-                         data::Dataset& dataset, const Encoding& encoding);
+                         data::Dataset& dataset, const Encoding& encoding,
+                         scene::StandIn stand_in = scene::StandIn::none);
 // The setting at which the view is drawn unchanged.
 quality::Setting own_setting(const scene::CompletedView& completed);
 

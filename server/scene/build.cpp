@@ -318,7 +318,8 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
 
 }  // namespace
 
-Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
+Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset,
+                          StandIn stand_in) {
   const View& view = completed.view();
   const Lattice& lattice = completed.lattice();
   Scene scene;
@@ -335,7 +336,13 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  const DrawnPart part = part_of(completed, dataset);
+  DrawnPart part = part_of(completed, dataset);
+  if (stand_in == StandIn::allowed) {
+    if (const auto other = stand_in_for(completed, part, dataset)) {
+      part = other->part;
+      scene.missing_bytes = other->missing_bytes;
+    }
+  }
   scene.level = part.halvings;
   scene.lattice.part = part.box;
   if (dataset.info().stored != nullptr) scene.wanted_level = part.wanted;

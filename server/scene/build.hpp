@@ -9,12 +9,14 @@
 #include "server/data/resident/dataset.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/level/parts.hpp"
+#include "server/scene/level/stand_in.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {
 
 // Loads only the fields that the view shows. Errors: those of loading; invalid (camera).
-Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset);
+Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset,
+                          StandIn stand_in = StandIn::none);
 // Completes the view first.
 Result<Scene> build_scene(const protocol::View& view, data::Dataset& dataset);
 
@@ -32,10 +34,6 @@ std::array<int, 3> level_at(const CompletedView& completed, int height,
                             const data::Dataset& dataset);
 
 // What a completed view needs of the dataset at any step, determined without loading.
-struct Needed {
-  std::string field;
-  data::Derivation how;
-};
 struct Needs {
   std::vector<Needed> fields;
   std::string places;  // the auxiliary variant of the places of a section; empty: none

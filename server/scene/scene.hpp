@@ -276,6 +276,8 @@ struct Scene {
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   // Of data with stored levels, the level that suffices for the picture.
   std::optional<std::array<int, 3>> wanted_level;
+  // Of what would be drawn and is not resident, where coarser data stand in for it; otherwise 0.
+  std::uint64_t missing_bytes = 0;
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
   std::optional<Light> light;

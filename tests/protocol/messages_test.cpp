@@ -332,6 +332,10 @@ TEST(Shapes, FrameInfoNamesTheLevelAndThePartOfDataWithStoredLevels) {
   expect_shape("frameInfo", json);
   EXPECT_EQ(Json::parse(json)["detail"], Json::parse(R"({"wanted":{"halvings":[0,0,0]},
                 "drawn":{"halvings":[1,1,0],"first":[64,0,8],"count":[128,64,16]}})"));
+  info.detail->missing_bytes = 12345;
+  const std::string standing_in = encode_frame_info(info);
+  expect_shape("frameInfo", standing_in);
+  EXPECT_EQ(Json::parse(standing_in)["detail"]["missingBytes"], 12345);
 }
 
 TEST(Shapes, FrameInfoHasARowForEachPart) {

@@ -2,6 +2,8 @@
 #include "server/data/model/box.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <system_error>
 #include <utility>
 
 #include "server/base/check.hpp"
@@ -92,6 +94,21 @@ std::string key_of(const Box& box) {
     for (const int n : three) text += (text.empty() ? "" : ",") + std::to_string(n);
   }
   return text;
+}
+
+std::optional<Box> box_of(const std::string& key) {
+  Box box;
+  const char* at = key.data();
+  const char* const end = at + key.size();
+  for (auto* const three : {&box.first, &box.count}) {
+    for (int& n : *three) {
+      if (at != key.data() && (at == end || *at++ != ',')) return std::nullopt;
+      const auto [after, fault] = std::from_chars(at, end, n);
+      if (fault != std::errc()) return std::nullopt;
+      at = after;
+    }
+  }
+  return at == end ? std::optional(box) : std::nullopt;
 }
 
 Box box_around(const std::array<int, 3>& index, const FieldInfo& field,

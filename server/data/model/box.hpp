@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,8 @@ bool is_within(const Box& box, const std::array<int, 3>& dims);
 Volume cut(const Volume& volume, const Box& box);
 // Identifies a box among those of a field.
 std::string key_of(const Box& box);
+// The box of such a text; nullopt: it is another text.
+std::optional<Box> box_of(const std::string& key);
 
 // Of fields that are read by boxes (FieldInfo::box_chunk):
 

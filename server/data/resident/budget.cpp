@@ -112,6 +112,19 @@ bool Budget::has(const ResidentKey& key) const {
   return found != entries_.end() && found->second->listed;
 }
 
+std::vector<std::string> Budget::endings_of(const ResidentKey& key) const {
+  const auto& [owner, field, step, beginning] = key;
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> out;
+  for (auto at = entries_.lower_bound(key); at != entries_.end(); ++at) {
+    const auto& [its_owner, its_field, its_step, variant] = at->first;
+    if (its_owner != owner || its_field != field || its_step != step) break;
+    if (!variant.starts_with(beginning)) break;
+    if (at->second->listed) out.push_back(variant.substr(beginning.size()));
+  }
+  return out;
+}
+
 void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
   const std::lock_guard lock(mutex_);
   // Removing prefetch requests needs no memory, because destructors do it.

@@ -86,6 +86,8 @@ class Budget {
   // The resident volume; null if it is absent or still loading.
   Resident find_now(const ResidentKey& key);
   [[nodiscard]] bool has(const ResidentKey& key) const;
+  // Resident volumes whose keys are `key`, apart from the end of the variant: these ends.
+  [[nodiscard]] std::vector<std::string> endings_of(const ResidentKey& key) const;
 
   // Replaces the prefetch requests of `owner`.
   void request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys);

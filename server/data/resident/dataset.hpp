@@ -93,6 +93,10 @@ class Dataset {
   // it is drawn. It has the bits of reduction(), and its variant. nullopt: neither is stored.
   [[nodiscard]] std::optional<Derivation> stored_reduction(const std::string& field,
                                                            const Coarsening& how) const;
+  [[nodiscard]] bool has(const std::string& field, std::size_t step, const Derivation& how) const;
+  // Boxes of which what `how` yields of `box` is resident, as their variants end with their keys.
+  [[nodiscard]] std::vector<Box> resident_boxes(const std::string& field, std::size_t step,
+                                                const Derivation& how, const Box& box) const;
   // Bytes of what a reduction of a field is computed from: by stored_reduction(), or by reduction()
   // if there is none.
   [[nodiscard]] std::uint64_t bytes_beside_level(const std::string& field,

@@ -75,6 +75,25 @@ bool Dataset::reads_within_limit(const std::string& field) const {
   return bytes <= state_->budget->bytes_max();
 }
 
+bool Dataset::has(const std::string& field, std::size_t step, const Derivation& how) const {
+  const auto key = key_of(field, step, how);
+  return key && state_->budget->has(*key);
+}
+
+std::vector<Box> Dataset::resident_boxes(const std::string& field, std::size_t step,
+                                         const Derivation& how, const Box& box) const {
+  auto key = key_of(field, step, how);
+  const std::string ending = data::key_of(box);
+  if (!key || !how.variant.ends_with(ending)) return {};
+  std::string& variant = std::get<3>(*key);
+  variant.resize(variant.size() - ending.size());
+  std::vector<Box> out;
+  for (const std::string& one : state_->budget->endings_of(*key)) {
+    if (const auto there = box_of(one)) out.push_back(*there);
+  }
+  return out;
+}
+
 Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, std::size_t step,
                                                     const Box& box) {
   const Result<std::size_t> index = state_->find(field, step);

@@ -114,7 +114,7 @@ quality::LevelDifferences means_of(const Values& near, const Values& far, const 
 
 std::optional<protocol::DetailReport> data_drawn(const scene::Scene& scene) {
   if (!scene.wanted_level) return std::nullopt;
-  protocol::DetailReport out{{*scene.wanted_level, {}}, {scene.level, {}}, {}};
+  protocol::DetailReport out{{*scene.wanted_level, {}}, {scene.level, {}}, {}, scene.missing_bytes};
   if (const auto& part = scene.lattice.part) out.drawn.box = std::array{part->first, part->count};
   return out;
 }

@@ -12,7 +12,6 @@
 #include "protocol/view/shown.hpp"
 #include "server/data/model/stored.hpp"
 #include "server/scene/build.hpp"
-#include "server/scene/level/parts.hpp"
 #include "server/scene/lines/mark.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
@@ -51,8 +50,6 @@ MergeLimits merge_limits(const View& view) {
   return limits;
 }
 
-namespace {
-
 std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) {
   std::vector<ShownField> shown;
   if (shows_lines(view)) {
@@ -66,6 +63,8 @@ std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) 
   }
   return shown;
 }
+
+namespace {
 
 bool keeps_part(const View& view) { return is_cropped(view.region) || !view.region.where.empty(); }
 
@@ -99,9 +98,8 @@ bool fits_in_full(const std::vector<ShownField>& shown, const data::Dataset& dat
   return dataset.fits_in_full(fields);
 }
 
-// Whether the view can be drawn from what is stored of a part of the samples, or of merged ones:
-// not what shows the samples of the whole themselves, as slices and streamlets do, or what a region
-// keeps of them.
+}  // namespace
+
 bool may_use_stored(const View& view, const Lattice& lattice, const data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
   const bool traced = shows_lines(view) && protocol::has_streamlets(view);
@@ -110,8 +108,6 @@ bool may_use_stored(const View& view, const Lattice& lattice, const data::Datase
          !traced && !keeps_part(view);
 }
 
-// Whether merged samples may be drawn in place of those of the data. The reference draws none, and
-// strided media do not.
 bool may_merge(const View& view) {
   const auto& media = *view.scalars;
   const bool strided = std::any_of(media.begin(), media.end(),
@@ -119,6 +115,8 @@ bool may_merge(const View& view) {
   return view.method.detail != protocol::Detail::full &&
          view.method.name != protocol::MethodName::reference && !strided;
 }
+
+namespace {
 
 // What of the data a view is drawn from.
 class Choice {

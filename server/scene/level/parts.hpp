@@ -29,6 +29,12 @@ struct ShownField {
   data::Coarsening coarsening;
 };
 
+// What a field is drawn from.
+struct Needed {
+  std::string field;
+  data::Derivation how;
+};
+
 // Whether a view can be drawn from a part: not what is computed from the whole, as light and
 // surfaces are.
 bool may_use_part(const protocol::View& view);

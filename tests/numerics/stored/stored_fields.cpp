@@ -92,7 +92,7 @@ class StoredFields final : public data::Source {
       data::StoredField field;
       field.has_levels = true;
       field.strided = volumes_[f]->components == 3 ? std::min(levels - 1, 4) : 0;
-      field.ranges.push_back({volumes_[f]->range, volumes_[f]->masked});
+      field.ranges.assign(info_.steps.size(), {volumes_[f]->range, volumes_[f]->masked});
       stored.fields.push_back(std::move(field));
     }
     info_.stored = std::make_shared<const data::StoredLevels>(std::move(stored));

@@ -18,7 +18,7 @@ namespace windsplat::test {
 using StoredLevelCache = std::map<std::tuple<std::size_t, std::size_t, data::StoredAs>,
                                   std::shared_ptr<const data::Volume>>;
 
-// volumes: of the fields of the description, at its only step. Each level halves every axis. Two
+// volumes: of the fields of the description, at every step. Each level halves every axis. Two
 // values of scalars, draws and middles of kernels of vectors are those of data::coarsen().
 std::unique_ptr<data::Source> stored_fields(
     data::DatasetInfo info, std::vector<std::shared_ptr<const data::Volume>> volumes, int levels,

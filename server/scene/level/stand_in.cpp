@@ -1,0 +1,162 @@
+#include "server/scene/level/stand_in.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/data/model/stored.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/detail.hpp"
+#include "server/scene/level/choice.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+// Of the memory limit, beside two boxes.
+constexpr double base_share_max = 0.1;
+
+// nullopt: there is no such part.
+std::optional<data::Derivation> derivation_of(const ShownField& shown,
+                                              const std::optional<data::Box>& box,
+                                              const data::Dataset& dataset) {
+  const auto& [field, how] = shown;
+  if (box) return part_of_field(dataset, field, how, *box);
+  auto stored = dataset.stored_reduction(field, how);
+  return stored ? std::move(*stored) : dataset.reduction(field, how);
+}
+
+// What is shown of one step, and what of it is resident.
+class Shown {
+ public:
+  Shown(const CompletedView& completed, const data::Dataset& dataset)
+      : view_(completed.view()),
+        completed_(completed),
+        dataset_(dataset),
+        step_(static_cast<std::size_t>(view_.step)) {}
+
+  [[nodiscard]] std::vector<ShownField> at(const std::array<int, 3>& halvings) const {
+    return shown_at(view_, coarsening_of(completed_.lattice(), halvings));
+  }
+
+  [[nodiscard]] std::uint64_t missing_bytes(const DrawnPart& part) const {
+    std::set<std::pair<std::string, std::string>> counted;
+    std::uint64_t bytes = 0;
+    for (const ShownField& one : at(part.halvings)) {
+      const auto how = derivation_of(one, part.box, dataset_);
+      if (!how || dataset_.has(one.field, step_, *how)) continue;
+      if (!counted.emplace(one.field, how->variant).second) continue;
+      bytes += part.box ? how->bytes : dataset_.level_bytes(one.field, one.coarsening);
+    }
+    return bytes;
+  }
+
+  [[nodiscard]] bool is_resident(const std::vector<ShownField>& shown,
+                                 const std::optional<data::Box>& box) const {
+    return std::all_of(shown.begin(), shown.end(), [&](const ShownField& one) {
+      const auto how = derivation_of(one, box, dataset_);
+      return how && dataset_.has(one.field, step_, *how);
+    });
+  }
+
+  // The smallest resident box of a level that holds what is in sight, and begins and ends as a box
+  // of the view does.
+  [[nodiscard]] std::optional<data::Box> resident_box(const std::array<int, 3>& halvings,
+                                                      const std::vector<ShownField>& shown) const {
+    const data::Box any;
+    const auto how = part_of_field(dataset_, shown.front().field, shown.front().coarsening, any);
+    if (!how) return std::nullopt;
+    const auto boxes = dataset_.resident_boxes(shown.front().field, step_, *how, any);
+    if (boxes.empty()) return std::nullopt;
+    const std::array<int, 3> data_dims = completed_.lattice().dims;
+    const std::array<int, 3> quantum = least_quantum(view_, data_dims, halvings);
+    const data::Box sight =
+        box_in_sight(view_, completed_.camera(), completed_.lattice(), halvings, quantum);
+    const auto fits = [&](const data::Box& box) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int end = box.first[a] + box.count[a];
+        const bool holds = box.first[a] <= sight.first[a] && end >= sight.first[a] + sight.count[a];
+        const bool whole =
+            box.first[a] % quantum[a] == 0 &&
+            (end % quantum[a] == 0 || end == data::halved(data_dims[a], halvings[a]));
+        if (!holds || !whole) return false;
+      }
+      return is_resident(shown, box);
+    };
+    std::optional<data::Box> best;
+    for (const data::Box& box : boxes) {
+      if ((!best || box.samples() < best->samples()) && fits(box)) best = box;
+    }
+    return best;
+  }
+
+ private:
+  const protocol::View& view_;
+  const CompletedView& completed_;
+  const data::Dataset& dataset_;
+  const std::size_t step_;
+};
+
+bool may_stand_in(const CompletedView& completed, const data::Dataset& dataset) {
+  return may_use_stored(completed.view(), completed.lattice(), dataset) &&
+         may_use_part(completed.view());
+}
+
+// Whether the level is stored of all fields, and it and what it is drawn from take little.
+bool is_base(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
+  std::vector<std::string> fields;
+  std::uint64_t bytes = 0;
+  for (const auto& [field, how] : shown) {
+    if (!dataset.stored_reduction(field, how)) return false;
+    bytes += dataset.level_bytes(field, how) + dataset.bytes_beside_level(field, how);
+    fields.push_back(field);
+  }
+  const auto all = static_cast<std::uint64_t>(static_cast<double>(bytes) / base_share_max);
+  return dataset.fits_beside_boxes(all, fields);
+}
+
+}  // namespace
+
+std::optional<Substitute> stand_in_for(const CompletedView& completed, const DrawnPart& wanted,
+                                       const data::Dataset& dataset) {
+  if (!may_stand_in(completed, dataset)) return std::nullopt;
+  const Shown shown(completed, dataset);
+  const std::uint64_t missing = shown.missing_bytes(wanted);
+  if (missing == 0) return std::nullopt;
+  for (const std::array<int, 3>& level : dataset.info().stored->levels) {
+    bool finer = false;
+    for (std::size_t a = 0; a < 3; ++a) finer = finer || level[a] < wanted.halvings[a];
+    if (finer) continue;
+    const bool same = level == wanted.halvings;
+    if (!same && !may_merge(completed.view())) break;
+    const auto fields = shown.at(level);
+    const auto box = shown.resident_box(level, fields);
+    if (!box && !shown.is_resident(fields, std::nullopt)) continue;
+    return Substitute{{level, box, wanted.wanted}, same ? 0 : missing};
+  }
+  return std::nullopt;
+}
+
+std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset& dataset) {
+  std::vector<Needed> out;
+  if (!may_stand_in(completed, dataset)) return out;
+  const DrawnPart wanted = part_of(completed, dataset);
+  const auto add = [&](const std::vector<ShownField>& fields, const std::optional<data::Box>& box) {
+    for (const ShownField& one : fields) {
+      if (auto how = derivation_of(one, box, dataset)) out.push_back({one.field, std::move(*how)});
+    }
+  };
+  const Shown shown(completed, dataset);
+  const std::array<int, 3>& coarsest = dataset.info().stored->levels.back();
+  const auto base = shown.at(coarsest);
+  if (wanted.halvings != coarsest && may_merge(completed.view()) && is_base(base, dataset)) {
+    add(base, std::nullopt);
+  }
+  add(shown.at(wanted.halvings), wanted.box);
+  return out;
+}
+
+}  // namespace windsplat::scene
