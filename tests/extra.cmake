@@ -79,6 +79,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(levels ${SYSTEM_PYTHON} tests/integration/levels/levels.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(stand_ins ${SYSTEM_PYTHON} tests/integration/levels/stand_ins.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi/openapi_requests.py
     --program=$<TARGET_FILE:windsplat> --count=600)
   windsplat_program_test(uploads ${SYSTEM_PYTHON} tests/integration/uploads.py

@@ -42,6 +42,8 @@ struct StartRender {
   protocol::View view;  // not completed; names its dataset; drawn by `setting`
   quality::Setting setting;
   Encoding encoding;
+  // Whether coarser data may stand in for those that are not in memory, so that it does not wait.
+  bool may_stand_in = false;
 };
 // No further frame of H.264 until one with `key`: the encoder is no longer needed.
 struct EndVideo {};

@@ -12,6 +12,10 @@
 // measured, flagged final. With maxError, slabs are halved until the measured error is within it.
 // The next change cancels these renders. A calibration run is requested after the final frame.
 //
+// Data. A moving frame does not wait for data while coarser ones are in memory that can stand in
+// for them (Drawn::info.detail.missingBytes), except in playback; the frames at rest wait for
+// theirs, and are cancelled by the next change.
+//
 // The link. A render starts no sooner than its frame will find link and client free (link.hpp), so
 // that it shows the newest view and does not queue. Quality and size of a moving frame follow the
 // rate of the link (moving_encoding.hpp); a slow one gets H.264 (video_choice.hpp). Because a final

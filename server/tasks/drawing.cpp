@@ -87,8 +87,8 @@ Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& d
 Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     const quality::Setting& setting,
                                     const frame::Encoding& encoding, data::Dataset& dataset,
-                                    Loading loading) {
-  auto prepared = frame::prepare(completed, setting, dataset, encoding);
+                                    Loading loading, scene::StandIn stand_in) {
+  auto prepared = frame::prepare(completed, setting, dataset, encoding, stand_in);
   if (!prepared) {
     // The loader waits for memory.
     if (loading == Loading::none) {

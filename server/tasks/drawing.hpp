@@ -51,7 +51,8 @@ Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& d
 Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     const quality::Setting& setting,
                                     const frame::Encoding& encoding, data::Dataset& dataset,
-                                    Loading loading);
+                                    Loading loading,
+                                    scene::StandIn stand_in = scene::StandIn::none);
 
 // draw() or fail() replies exactly once unless this function returns an error: busy. Loads of
 // requests are subject to admission; sessions limit the loads of streams to one picture at a time

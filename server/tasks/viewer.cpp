@@ -1,6 +1,7 @@
 // Effects of a session become render and load jobs; their results become events of the session.
 #include "server/tasks/viewer.hpp"
 
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -11,6 +12,7 @@
 #include "server/frame/frame_info.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/describe.hpp"
+#include "server/scene/level/stand_in.hpp"
 #include "server/tasks/calibration_job.hpp"
 #include "server/tasks/drawing.hpp"
 #include "server/tasks/error_report.hpp"
@@ -52,7 +54,8 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
   out.viewpoint = observed.viewpoint;
   out.halvings = drawn->halvings;
   out.view_json = protocol::encode_view(drawn->view);
-  if (!picture.frame.encoding.measure && loading == Loading::none) {
+  if (!picture.frame.encoding.measure && loading == Loading::none &&
+      picture.frame.scene.missing_bytes == 0) {
     if (const auto listed = quality::index_of(picture.frame.setting)) {
       backend.quality.add_frame(out.signature, *listed, out.viewpoint,
                                 1e-3 * static_cast<double>(drawn->render_us));
@@ -80,6 +83,8 @@ Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription
   description->axes = {};
   return description;
 }
+
+Error frame_cancelled() { return make_error(ErrorKind::cancelled, "frame cancelled"); }
 
 constexpr int describing_max = 4;  // limit per session
 
@@ -126,6 +131,48 @@ struct Viewer::Video {
   }
 };
 
+// A render of the session. It replies once.
+struct Viewer::Running {
+  explicit Running(DrawnReply to, bool video) : as_video(video), send(std::move(to)) {}
+  void reply(std::uint64_t ticket, Result<session::Drawn> drawn) {
+    if (!replied.exchange(true)) send(ticket, std::move(drawn));
+  }
+  const CancelToken cancel;
+  const bool as_video;  // uses the encoder until it replies
+  // Whichever comes second sees the other.
+  static constexpr unsigned waits_for_data = 1;
+  static constexpr unsigned was_cancelled = 2;
+  std::atomic<unsigned> events = 0;
+  std::atomic<bool> replied = false;
+  const DrawnReply send;
+};
+
+// What is loaded while the view moves, by the thread that prefetches: it is requested as long as
+// the view is shown.
+struct Viewer::Loads {
+  void renew(Backend& backend, std::uint64_t owner, const scene::CompletedView& drawn,
+             const data::Dataset& dataset) {
+    std::vector<data::PrefetchRequest> requests;
+    const auto step = static_cast<std::size_t>(drawn.view().step);
+    for (auto& [field, how] : scene::loads_of(drawn, dataset)) {
+      requests.push_back({dataset, field, step, std::move(how), std::nullopt});
+    }
+    const std::lock_guard lock(mutex);
+    if (!ended) backend.catalogue.store().request_prefetch(owner_of(owner), std::move(requests));
+  }
+  void end(Backend& backend, std::uint64_t owner) {
+    const std::lock_guard lock(mutex);
+    ended = true;
+    backend.catalogue.store().request_prefetch(owner_of(owner), {});
+  }
+
+ private:
+  // Beside the session's requests for other steps.
+  static std::uint64_t owner_of(std::uint64_t session) { return session | std::uint64_t{1} << 63; }
+  std::mutex mutex;
+  bool ended = false;
+};
+
 // Pending prefetch requests. A dataset has at most one waiting job, however often the view changes;
 // the job evaluates the newest request when it runs.
 struct Viewer::PrefetchState {
@@ -145,12 +192,11 @@ Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
     : backend_(backend),
       owner_(owner),
       payer_(std::move(payer)),
-      requests_(std::make_shared<PrefetchState>()) {}
+      requests_(std::make_shared<PrefetchState>()),
+      loads_(std::make_shared<Loads>()) {}
 
 void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   calibration_.cancel();  // the view is changing again
-  const CancelToken cancel;
-  running_.emplace(effect.ticket, cancel);
   auto dataset = find_shown(backend_.catalogue, effect.view);
   if (!dataset) return reply(effect.ticket, dataset.error());
   shown_ = backend_.catalogue.use(effect.view.dataset);
@@ -160,8 +206,10 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   if (const auto fits = backend_.check(effect.view); !fits) {
     return reply(effect.ticket, fits.error());
   }
-  const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
   const bool as_video = effect.encoding.codec == protocol::Codec::h264;
+  const auto running = std::make_shared<Running>(std::move(reply), as_video);
+  const CancelToken& cancel = running->cancel;
+  running_.emplace(effect.ticket, running);
   if (as_video && video_ == nullptr) {
     if (auto encoder = backend_.video.open()) {
       video_ = std::make_shared<Video>(Video{std::move(encoder), {}, 0});
@@ -170,13 +218,22 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   const auto video = as_video ? video_ : nullptr;
   Drawing drawing{
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
-  drawing.prepare = [&backend = backend_, effect, cancel, video, completion = completion_](
-                        data::Dataset& available, Loading loading) {
+  drawing.prepare = [&backend = backend_, effect, cancel, video, completion = completion_, running,
+                     loads = loads_, owner = owner_](data::Dataset& available, Loading loading) {
     return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
       const auto completed = completion->of(effect.view, available);
       if (!completed) return completed.error();
-      auto picture = prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding),
-                                     available, loading);
+      const bool may_stand_in = effect.may_stand_in && loading == Loading::none;
+      auto picture =
+          prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding), available,
+                          loading, may_stand_in ? scene::StandIn::allowed : scene::StandIn::none);
+      if (!picture && picture.error().kind == ErrorKind::not_resident) {
+        const unsigned before = running->events.fetch_or(Running::waits_for_data);
+        if ((before & Running::was_cancelled) != 0) return frame_cancelled();
+      }
+      if (picture && effect.may_stand_in) {
+        loads->renew(backend, owner, (*picture)->frame.completed, available);
+      }
       if (picture && video) video->encode(**picture, available);
       if (picture && effect.encoding.measure) {
         (*picture)->frame.content = frame::known_viewpoint_of(*completed, backend.quality).content;
@@ -184,19 +241,21 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
       return picture;
     });
   };
-  drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, shared](
+  drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, running](
                      const PreparedPicture& picture, data::Dataset& resident, std::int64_t queue_us,
                      Loading loading) {
     auto drawn = run_guarded<session::Drawn>("a frame", cancel, [&] {
       return draw(backend, picture, resident, queue_us, loading, cancel);
     });
     if (drawn) drawn->loaded = loading == Loading::allowed;
-    (*shared)(ticket, std::move(drawn));
+    running->reply(ticket, std::move(drawn));
   };
-  drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
+  drawing.fail = [ticket = effect.ticket, running](const Error& error) {
+    running->reply(ticket, error);
+  };
   // Jobs of streams are refused at shutdown only.
   if (const auto queued = submit(backend_, std::move(drawing)); !queued) {
-    (*shared)(effect.ticket, queued.error());
+    running->reply(effect.ticket, queued.error());
   }
 }
 
@@ -293,14 +352,21 @@ void Viewer::start(const session::Calibrate& effect) {
 }
 
 void Viewer::cancel(std::uint64_t ticket) {
-  if (const auto found = running_.find(ticket); found != running_.end()) found->second.cancel();
+  const auto found = running_.find(ticket);
+  if (found == running_.end()) return;
+  const auto running = found->second;
+  running->cancel.cancel();
+  const unsigned before = running->events.fetch_or(Running::was_cancelled);
+  if ((before & Running::waits_for_data) == 0 || running->as_video) return;
+  running->reply(ticket, frame_cancelled());
 }
 
 void Viewer::cancel_all() {
   gone_.cancel();
   calibration_.cancel();
   cancel_prefetch();
-  for (const auto& [ticket, token] : running_) token.cancel();
+  loads_->end(backend_, owner_);
+  for (const auto& [ticket, running] : running_) running->cancel.cancel();
 }
 
 }  // namespace windsplat::tasks

@@ -33,6 +33,7 @@ class Viewer {
   // Measures time and error of the settings for a view while the renderer is idle.
   void start(const session::Calibrate& effect);
   void start(const session::EndVideo& /*effect*/) { video_.reset(); }
+  // A render that waits for data replies at once.
   void cancel(std::uint64_t ticket);
   void done(std::uint64_t ticket) { running_.erase(ticket); }
   void cancel_all();
@@ -47,15 +48,18 @@ class Viewer {
   Backend& backend_;
   const std::uint64_t owner_;
   const std::string payer_;
-  data::ChosenDatasets::Use shown_;               // of the dataset of the newest picture
-  data::ChosenDatasets::Use subtracted_;          // of the one that it subtracts
-  std::map<std::uint64_t, CancelToken> running_;  // keyed by ticket
-  std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
+  data::ChosenDatasets::Use shown_;       // of the dataset of the newest picture
+  data::ChosenDatasets::Use subtracted_;  // of the one that it subtracts
+  struct Running;
+  std::map<std::uint64_t, std::shared_ptr<Running>> running_;  // keyed by ticket
+  std::shared_ptr<PrefetchState> requests_;  // shared with the jobs that evaluate them
   // Shared with jobs.
   std::shared_ptr<ViewCompletion> completion_ = std::make_shared<ViewCompletion>();
   CancelToken gone_;  // cancels descriptions
   std::shared_ptr<const char> describing_ =
       std::make_shared<const char>();  // held by each description job
+  struct Loads;
+  std::shared_ptr<Loads> loads_;  // shared with the jobs that renew them
   struct Video;
   std::shared_ptr<Video> video_;  // shared with the job that uses it
   CancelToken calibration_;       // cancels the latest calibration

@@ -34,6 +34,8 @@ Render render_by(const SessionState& state, Purpose purpose, const FramePlan& pl
 
 void start(SessionState& state, Purpose purpose, const FramePlan& plan, Micros now) {
   Render render = render_by(state, purpose, plan, now);
+  // Playback waits for the data of its steps, or drops them.
+  render.may_stand_in = purpose == Purpose::moving && !state.player.running();
   render.played =
       state.player.running() && state.slot.started_version() < state.view.step_version();
   state.slot.start(std::move(render), state.view.view(), state.effects);

@@ -137,7 +137,9 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
   if (!drawn.signature.key.empty() && render.version == state.version()) {
     times_.complete(view, drawn);
   }
-  if (drawn.loaded) return;
+  // Frames of other data than those of the setting do not predict its time.
+  const bool stands_in = drawn.info.detail && drawn.info.detail->missing_bytes > 0;
+  if (drawn.loaded || stands_in) return;
   if (render.purpose == Purpose::moving) {
     constexpr double newest = 0.2;
     queue_us_ = waited_us() + newest * (static_cast<double>(drawn.queue_us) - waited_us());

@@ -50,7 +50,7 @@ class QualityControl {
   [[nodiscard]] const quality::Setting& moving_setting() const { return moving_setting_; }
 
   void on_view_changed(bool other_dataset);
-  // Learns times only from frames drawn without loading.
+  // Learns times only from frames drawn without loading, for which nothing stands in.
   void learn(const Render& render, const Drawn& drawn, const ViewState& state, Micros now);
   // Records that a frame is sent; `text_bytes` precede it.
   void learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,

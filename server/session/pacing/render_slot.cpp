@@ -13,7 +13,8 @@ void RenderSlot::start(Render render, const protocol::View& view, Effects& effec
   render.step = view.step;
   render.dataset = view.dataset;
   if (render.purpose != Purpose::still) started_version_ = render.version;
-  effects.emplace_back(StartRender{render.ticket, view, render.setting, render.encoding});
+  effects.emplace_back(
+      StartRender{render.ticket, view, render.setting, render.encoding, render.may_stand_in});
   render_ = std::move(render);
 }
 

@@ -26,6 +26,7 @@ struct Render {
   quality::Setting setting;
   Encoding encoding;
   std::uint32_t still_id = 0;
+  bool may_stand_in = false;
   bool unwanted = false;   // true: its frame will not be sent
   bool played = false;     // the first one of a step reached by playback
   bool old_video = false;  // of a stream of H.264 that the client has abandoned meanwhile

@@ -153,6 +153,7 @@ class Driver {
   std::optional<Reading> reading;  // of the dataset "wind"
   std::vector<Calibrate> calibrations;
   std::optional<quality::Forecasts> calibrated;  // forecasts known; empty: the prior
+  std::uint64_t missing_bytes = 0;               // of frames for which coarser data may stand in
   bool averaged = false;  // averaged data: errors of final frames do not depend on their slabs
   std::optional<double> measured_error;  // error of final frames drawn with slabs of the view's own
                                          // thickness
@@ -184,6 +185,8 @@ class Driver {
       out.info.error_value = quality::forecast_between(done.setting, *calibrated).error;
       out.info.error_kind = "estimated";
     }
+    if (done.may_stand_in && missing_bytes > 0)
+      out.info.detail.emplace().missing_bytes = missing_bytes;
     out.info.tiles = 1;
     const bool moving = !done.encoding.full_chroma;
     for (const double height : done.view.camera.eye.value_or(protocol::Vec3{})) {

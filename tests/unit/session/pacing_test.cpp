@@ -38,6 +38,43 @@ TEST(Pacing, SinglePatchGivesAMovingAndThenTheFinalFrame) {
   EXPECT_FALSE(driver.render) << "nothing is left to render";
 }
 
+TEST(Pacing, MovingFramesDoNotWaitForDataAndFramesAtRestDo) {
+  Driver driver;
+  driver.missing_bytes = 1000;
+  for (std::uint32_t rev = 1; rev <= 3; ++rev) {
+    driver.patch(rev, rev == 1 ? R"({"dataset":"wind"})" : azimuth(static_cast<int>(rev)));
+    ASSERT_TRUE(driver.render);
+    EXPECT_TRUE(driver.render->may_stand_in);
+    driver.finish_render();
+    driver.ack(rev);
+    EXPECT_FALSE(Driver::is_final(driver.frames.back()));
+  }
+  driver.say(protocol::StillMessage{5, {}, {}, "png"});
+  ASSERT_TRUE(driver.render);
+  EXPECT_FALSE(driver.render->may_stand_in) << "a still shows what is wanted";
+  driver.finish_render();
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  EXPECT_FALSE(driver.render->may_stand_in);
+  driver.finish_render(3000 * ms, true);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_EQ(driver.frames.back().header.rev, 3U);
+  driver.ack(driver.frames.back().header.seq);
+  driver.wait(5000 * ms);
+  EXPECT_FALSE(driver.render) << "the final frame is the last";
+}
+
+TEST(Pacing, FramesOfPlaybackWaitForTheirData) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.say(play(0, 5, 5, true, false));
+  driver.wait(300 * ms);
+  ASSERT_TRUE(driver.render);
+  EXPECT_FALSE(driver.render->encoding.full_chroma);
+  EXPECT_FALSE(driver.render->may_stand_in);
+}
+
 TEST(Pacing, MovingFramesUseKernelsAndFinalOnesTheRequestedMethod) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");

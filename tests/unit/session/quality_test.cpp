@@ -112,6 +112,20 @@ TEST(Setting, OneSlowLoadDoesNotCoarsenLaterFrames) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
+TEST(Setting, FramesOfDataThatStandInDoNotPredictTheTimeOfOthers) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  const auto cost = [](const quality::Setting& setting) {
+    return (100 * ms) >> (2 * setting.half_level + 2 * setting.coarser);
+  };
+  const auto before = drag(driver, 30, rev, cost).back();
+  driver.missing_bytes = 1000;
+  const auto meanwhile =
+      drag(driver, 30, rev, [](const quality::Setting&) { return 1 * ms; }).back();
+  EXPECT_EQ(meanwhile, before);
+}
+
 TEST(Setting, KeepsAMinimumPictureSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
