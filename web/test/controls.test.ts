@@ -289,6 +289,10 @@ test("the HUD names the level and the part of a store that are drawn, and the le
     detailLine({ detail: { wanted: level(1), drawn: { ...level(2), ...part } } }),
     "level 2,2,2 · part of 64 x 128 x 64 samples · wanted level 1,1,1",
   );
+  assert.equal(
+    detailLine({ detail: { wanted, drawn: level(3), missingBytes: 5_000_000 } }),
+    "level 3,3,3 · wanted full detail · finer detail is being loaded (5.0 MB)",
+  );
 });
 
 test("the HUD names method and compositing, and the samples that were skipped", () => {

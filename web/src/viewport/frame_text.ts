@@ -3,7 +3,7 @@
 import type { FrameState } from "@windsplat/client/parts";
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
 import type { ChosenMessage, FrameHeader, StatsMessage } from "@windsplat/client";
-import { formatNumber } from "../base/ticks";
+import { formatBytes, formatNumber } from "../base/ticks";
 
 export interface LabelText {
   text: string;
@@ -162,7 +162,11 @@ export function detailLine({ detail }: Pick<ChosenMessage, "detail">): string {
   const part = drawn.count === undefined ? "" : ` · part of ${drawn.count.join(" x ")} samples`;
   const finer =
     wanted.halvings.join() === drawn.halvings.join() ? "" : ` · wanted ${levelText(wanted)}`;
-  return `${levelText(drawn)}${part}${finer}`;
+  const missing =
+    detail.missingBytes === undefined
+      ? ""
+      : ` · finer detail is being loaded (${formatBytes(detail.missingBytes)})`;
+  return `${levelText(drawn)}${part}${finer}${missing}`;
 }
 
 const levelText = ({ halvings }: { halvings: number[] }): string =>
