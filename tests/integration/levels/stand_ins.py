@@ -142,6 +142,20 @@ class StandIns(unittest.TestCase):
         self.assertNotIn("missingBytes", chosen["detail"])
         self.assertEqual(picture, self.picture({**VIEW, "camera": camera}))
 
+    def test_what_is_missing_arrives_while_the_view_moves(self):
+        session = Session(self.daemon)
+        self.addCleanup(session.close)
+        self.settled(session)
+        for n in range(1000):
+            camera = looking_at(0.7 + 1e-5 * n, 0.4)
+            _, final, chosen, _ = session.frame_of(session.patch({"camera": camera}))
+            self.assertFalse(final)
+            if "missingBytes" not in chosen["detail"]:
+                break
+            time.sleep(0.01)
+        self.assertEqual(chosen["detail"]["drawn"]["halvings"], [0, 0, 0])
+        self.assertGreater(n, 0)
+
     def test_final_frames_do_not_depend_on_earlier_cameras(self):
         rng = random.Random(5)
         session = Session(self.daemon)

@@ -40,10 +40,11 @@ void load_level(data::Dataset& dataset, const std::string& field,
 }
 
 void load_box(data::Dataset& dataset, const scene::CompletedView& completed, int halvings,
-              const data::Box& box) {
-  const auto how = scene::coarsening_of(completed.lattice(), {halvings, halvings, halvings});
-  const auto part = scene::part_of_field(dataset, "cloud", how, box);
-  ASSERT_TRUE(dataset.derived("cloud", 0, part.value()));
+              const data::Box& box, const std::string& field = "cloud") {
+  auto how = scene::coarsening_of(completed.lattice(), {halvings, halvings, halvings});
+  if (field == "wind") how = scene::drawn(how, completed.view());
+  const auto part = scene::part_of_field(dataset, field, how, box);
+  ASSERT_TRUE(dataset.derived(field, 0, part.value()));
 }
 
 data::Box sight(const scene::CompletedView& completed, int halvings) {
@@ -117,7 +118,11 @@ TEST(StandIn, IsOfAllFieldsAtTheStepOfTheView) {
   load_level(tight, "wind", scene::complete(view, tight).value(), levels - 1);
   EXPECT_FALSE(substitute(completed, tight)) << "lines of another stride";
   load_level(tight, "wind", completed, levels - 1);
-  EXPECT_TRUE(substitute(completed, tight));
+  load_box(tight, completed, 2, sight(completed, 2), "wind");
+  ASSERT_TRUE(substitute(completed, tight));
+  EXPECT_EQ(substitute(completed, tight)->part.halvings, coarsest);
+  load_box(tight, completed, 2, sight(completed, 2));
+  EXPECT_EQ(substitute(completed, tight)->part.halvings, (std::array{2, 2, 2}));
 }
 
 TEST(StandIn, IsNotAPartThatBeginsWithinAKernel) {
