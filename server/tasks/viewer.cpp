@@ -150,15 +150,26 @@ struct Viewer::Running {
 // What is loaded while the view moves, by the thread that prefetches: it is requested as long as
 // the view is shown.
 struct Viewer::Loads {
+  // Of a moving frame; nothing if that was cancelled, as a later one may have renewed them.
   void renew(Backend& backend, std::uint64_t owner, const scene::CompletedView& drawn,
-             const data::Dataset& dataset) {
+             const data::Dataset& dataset, const CancelToken& cancel) {
     std::vector<data::PrefetchRequest> requests;
     const auto step = static_cast<std::size_t>(drawn.view().step);
     for (auto& [field, how] : scene::loads_of(drawn, dataset)) {
       requests.push_back({dataset, field, step, std::move(how), std::nullopt});
     }
     const std::lock_guard lock(mutex);
-    if (!ended) backend.catalogue.store().request_prefetch(owner_of(owner), std::move(requests));
+    if (ended || cancel.cancelled() || (requests.empty() && !of)) return;
+    of.reset();
+    if (!requests.empty()) of.emplace(drawn.view().dataset, drawn.view().step);
+    backend.catalogue.store().request_prefetch(owner_of(owner), std::move(requests));
+  }
+  // Withdraws those of another dataset or step.
+  void keep(Backend& backend, std::uint64_t owner, const protocol::View& view) {
+    const std::lock_guard lock(mutex);
+    if (!of || *of == std::pair(view.dataset, view.step)) return;
+    of.reset();
+    backend.catalogue.store().request_prefetch(owner_of(owner), {});
   }
   void end(Backend& backend, std::uint64_t owner) {
     const std::lock_guard lock(mutex);
@@ -171,6 +182,7 @@ struct Viewer::Loads {
   static std::uint64_t owner_of(std::uint64_t session) { return session | std::uint64_t{1} << 63; }
   std::mutex mutex;
   bool ended = false;
+  std::optional<std::pair<std::string, int>> of;  // dataset and step of what is requested
 };
 
 // Pending prefetch requests. A dataset has at most one waiting job, however often the view changes;
@@ -197,6 +209,7 @@ Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
 
 void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   calibration_.cancel();  // the view is changing again
+  loads_->keep(backend_, owner_, effect.view);
   auto dataset = find_shown(backend_.catalogue, effect.view);
   if (!dataset) return reply(effect.ticket, dataset.error());
   shown_ = backend_.catalogue.use(effect.view.dataset);
@@ -232,7 +245,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
         if ((before & Running::was_cancelled) != 0) return frame_cancelled();
       }
       if (picture && effect.may_stand_in) {
-        loads->renew(backend, owner, (*picture)->frame.completed, available);
+        loads->renew(backend, owner, (*picture)->frame.completed, available, cancel);
       }
       if (picture && video) video->encode(**picture, available);
       if (picture && effect.encoding.measure) {
