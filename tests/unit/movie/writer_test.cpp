@@ -182,7 +182,7 @@ TEST(MovieWriter, TheEndOfAMessageIsKept) {
 // The whole of a small WebM is written at its end.
 TEST(MovieWriter, AVideoWhoseEndCannotBeWrittenFails) {
   const auto ffmpeg = find_ffmpeg();
-  ASSERT_TRUE(ffmpeg) << ffmpeg.error().message;
+  if (!ffmpeg) GTEST_SKIP() << ffmpeg.error().message;
   const int full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
   ASSERT_GE(full, 0);
   Options options;
