@@ -1,7 +1,9 @@
 // Owners in turn, the earliest request of each first; failed requests wait for new ones.
 #include "server/data/resident/prefetch_thread.hpp"
 
+#include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <exception>
 #include <map>
@@ -30,12 +32,18 @@ struct PrefetchThread::State {
       queue.requests.pop_front();
       if (queue.requests.empty()) queues.erase(owner);
       lock.unlock();
-      const bool full = !load(*request);
+      const Outcome outcome = load(*request);
+      const auto key = request->dataset.key_of(request->field, request->step, request->how);
       request.reset();
       lock.lock();
+      const auto unreadable = failed.find(owner);
+      if (outcome == Outcome::failed && key && unreadable != failed.end()) {
+        unreadable->second.insert_or_assign(*key, Clock::now());
+      }
       // If there is no room for this request, there is none for the later ones, until they are
       // replaced.
       const auto rest = queues.find(owner);
+      const bool full = outcome == Outcome::no_room;
       if (full && rest != queues.end() && rest->second.version == version) queues.erase(rest);
     }
   }
@@ -48,30 +56,30 @@ struct PrefetchThread::State {
     return last;
   }
 
-  // Returns false if an allocation failed.
-  static bool load(const PrefetchRequest& request) noexcept {
+  enum class Outcome : std::uint8_t { done, no_room, failed };
+
+  static Outcome load(const PrefetchRequest& request) noexcept {
     try {
       return try_to_load(request);
     } catch (const std::exception&) {
       log::error("prefetch failed");  // no details: there may be no memory for them
-      return false;
+      return Outcome::no_room;
     }
   }
-  static bool try_to_load(const PrefetchRequest& request) {
+  static Outcome try_to_load(const PrefetchRequest& request) {
     const auto loaded =
         request.dataset.prefetching().derived(request.field, request.step, request.how);
-    if (loaded) return true;
+    if (loaded) return Outcome::done;
     const Error& error = loaded.error();
-    if (error.kind == ErrorKind::out_of_memory) return false;
+    if (error.kind == ErrorKind::out_of_memory) return Outcome::no_room;
     const bool given_up = error.kind == ErrorKind::not_resident ||
                           error.kind == ErrorKind::not_found || error.kind == ErrorKind::draining;
-    if (!given_up) {
-      log::debug("prefetch failed", {{"dataset", request.dataset.info().id},
-                                     {"field", request.field},
-                                     {"step", request.step},
-                                     {"error", error.message}});
-    }
-    return true;
+    if (given_up) return Outcome::done;
+    log::debug("prefetch failed", {{"dataset", request.dataset.info().id},
+                                   {"field", request.field},
+                                   {"step", request.step},
+                                   {"error", error.message}});
+    return Outcome::failed;
   }
 
   const std::shared_ptr<Budget> budget;
@@ -82,6 +90,11 @@ struct PrefetchThread::State {
     std::uint64_t version = 0;             // distinguishes them from later requests of the owner
   };
   std::map<std::uint64_t, Queue> queues;  // keyed by owner
+  // What could not be read of the requests of each owner that has some, and when. It is not tried
+  // again for a while: a moving view repeats its requests at each frame.
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds retry_after{10};
+  std::map<std::uint64_t, std::map<ResidentKey, Clock::time_point>> failed;
   std::uint64_t version = 0;
   std::uint64_t last = 0;
   bool stopping = false;
@@ -105,6 +118,7 @@ void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchR
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);
+    state_->failed.erase(owner);
     return;
   }
   std::vector<ResidentKey> keys;
@@ -119,6 +133,13 @@ void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchR
   state_->budget->request_prefetch(owner, keys);
   {
     const std::lock_guard lock(state_->mutex);
+    auto& failed = state_->failed[owner];
+    const auto retried = State::Clock::now() - State::retry_after;
+    std::erase_if(failed, [&](const auto& one) { return one.second <= retried; });
+    std::erase_if(absent, [&](const PrefetchRequest& request) {
+      const auto own = request.dataset.key_of(request.field, request.step, request.how);
+      return failed.contains(own.value());
+    });
     if (absent.empty()) {
       state_->queues.erase(owner);
     } else {
