@@ -69,6 +69,9 @@ struct Prefetch {
   std::vector<int> steps;
   quality::Setting setting;  // setting with which they will be drawn
 };
+// The client hides the picture: what moving frames asked for need not be loaded, nor stay in
+// memory.
+struct Hide {};
 // The view is at rest: measure time and error of each setting for it. Not answered; cancelled by
 // the next render, and sent again after the last of the stills.
 struct Calibrate {
@@ -80,7 +83,7 @@ struct Close {
   std::string reason;
 };
 using Effect = std::variant<SendText, Describe, StartRender, EndVideo, CancelRender, Ping,
-                            SendFrame, Prefetch, Calibrate, Close>;
+                            SendFrame, Prefetch, Hide, Calibrate, Close>;
 using Effects = std::vector<Effect>;
 
 // A rendered frame.

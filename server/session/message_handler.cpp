@@ -109,7 +109,9 @@ void MessageHandler::operator()(const protocol::VisibilityMessage& message) {
     state_.player.move_to(state_.view.view().step, now_);
   }
   state_.hidden = message.hidden;
-  if (state_.hidden) state_.slot.abandon(state_.effects);
+  if (!state_.hidden) return;
+  state_.slot.abandon(state_.effects);
+  state_.effects.emplace_back(Hide{});
 }
 
 void MessageHandler::operator()(const protocol::VideoMessage& message) {

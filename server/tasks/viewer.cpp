@@ -171,9 +171,10 @@ struct Viewer::Loads {
     of.reset();
     backend.catalogue.store().request_prefetch(owner_of(owner), {});
   }
-  void end(Backend& backend, std::uint64_t owner) {
+  void withdraw(Backend& backend, std::uint64_t owner, bool for_ever) {
     const std::lock_guard lock(mutex);
-    ended = true;
+    ended = ended || for_ever;
+    of.reset();
     backend.catalogue.store().request_prefetch(owner_of(owner), {});
   }
 
@@ -358,6 +359,8 @@ void Viewer::cancel_prefetch() {
   backend_.catalogue.store().request_prefetch(owner_, {});
 }
 
+void Viewer::start(const session::Hide& /*effect*/) { loads_->withdraw(backend_, owner_, false); }
+
 void Viewer::start(const session::Calibrate& effect) {
   calibration_.cancel();
   calibration_ = CancelToken();
@@ -378,7 +381,7 @@ void Viewer::cancel_all() {
   gone_.cancel();
   calibration_.cancel();
   cancel_prefetch();
-  loads_->end(backend_, owner_);
+  loads_->withdraw(backend_, owner_, true);
   for (const auto& [ticket, running] : running_) running->cancel.cancel();
 }
 

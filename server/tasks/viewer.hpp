@@ -33,6 +33,8 @@ class Viewer {
   // Measures time and error of the settings for a view while the renderer is idle.
   void start(const session::Calibrate& effect);
   void start(const session::EndVideo& /*effect*/) { video_.reset(); }
+  // Withdraws what moving frames asked for.
+  void start(const session::Hide& effect);
   // A render that waits for data replies at once.
   void cancel(std::uint64_t ticket);
   void done(std::uint64_t ticket) { running_.erase(ticket); }

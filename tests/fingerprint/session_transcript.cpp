@@ -186,6 +186,7 @@ class Transcript {
     for (const int step : wanted.steps) std::cout << ' ' << step;
   }
   void print(const EndVideo&, bool&) { std::cout << "end video"; }
+  void print(const Hide&, bool&) { std::cout << "hide"; }
   void print(const Calibrate&, bool&) { std::cout << "survey"; }
   void print(const Close& close, bool&) {
     std::cout << "close " << close.code << ' ' << close.reason;

@@ -30,6 +30,7 @@ class SessionWork {
   void start(const session::Prefetch& effect) { viewer_.start(effect); }
   void start(const session::Calibrate& effect) { viewer_.start(effect); }
   void start(const session::EndVideo& effect) { viewer_.start(effect); }
+  void start(const session::Hide& effect) { viewer_.start(effect); }
   void cancel(std::uint64_t ticket);
   void stop();
 

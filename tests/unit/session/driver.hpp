@@ -147,6 +147,7 @@ class Driver {
   std::size_t payload_bytes = 100;  // of each frame
   bool video_fails = false;         // frames asked as H.264 are JPEG
   int videos_ended = 0;
+  int hides = 0;
   int step_count = steps;
   Micros waiting = 0;              // of the frames of other sessions
   Micros queue = 0;                // simulated time that a frame waits for the renderer
@@ -230,6 +231,7 @@ class Driver {
         unwritten_ = true;
       }
       if (std::holds_alternative<EndVideo>(effect)) ++videos_ended;
+      if (std::holds_alternative<Hide>(effect)) ++hides;
       if (auto* request = std::get_if<Prefetch>(&effect)) requests.push_back(*request);
       if (auto* calibration = std::get_if<Calibrate>(&effect)) calibrations.push_back(*calibration);
       if (auto* close = std::get_if<Close>(&effect)) closed = *close;

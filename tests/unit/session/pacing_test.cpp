@@ -263,8 +263,10 @@ TEST(Pacing, FinalFrameFinishedJustBeforeAChangeIsDropped) {
 TEST(Pacing, HiddenClientGetsNothingUntilVisible) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
+  EXPECT_EQ(driver.hides, 0);
   driver.say(protocol::VisibilityMessage{true});
   EXPECT_TRUE(driver.cancelled);
+  EXPECT_EQ(driver.hides, 1) << "its data need not be loaded";
   driver.finish_render(1 * ms);
   driver.patch(2, azimuth(1));
   driver.wait(2000 * ms);
