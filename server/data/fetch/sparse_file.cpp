@@ -54,10 +54,10 @@ SparseFile::SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> 
       validators_(response.validators),
       bytes_(response.file_bytes),
       bytes_max_(bytes_max),
-      state_(state_of(url, bytes_, validators_.etag)),
-      fetched_bytes_(begin_bytes),
-      next_(block_of(begin_bytes)) {
-  if (next_ > 0) present_[0] = next_;
+      state_(state_of(url, bytes_, validators_.etag)) {
+  blocks_.fetched_bytes = begin_bytes;
+  blocks_.next = block_of(begin_bytes);
+  if (blocks_.next > 0) blocks_.present[0] = blocks_.next;
 }
 
 Result<std::shared_ptr<SparseFile>> SparseFile::make(const std::string& url, PartialFile begin,
@@ -88,59 +88,116 @@ Result<Descriptor> SparseFile::open() const {
 
 std::uint64_t SparseFile::fetched_bytes() const {
   const std::lock_guard lock(mutex_);
-  return fetched_bytes_;
+  return blocks_.fetched_bytes;
 }
 
-std::pair<std::size_t, std::size_t> SparseFile::first_missing(std::size_t from,
-                                                              std::size_t end) const {
+bool SparseFile::is_present(const Extent& extent) const {
   const std::lock_guard lock(mutex_);
-  const auto after = present_.upper_bound(from);
-  if (after != present_.begin()) from = std::max(from, std::prev(after)->second);
-  from = std::min(from, end);
-  return {from, after == present_.end() ? end : std::min(end, after->first)};
+  return blocks_.first_missing(block_of(extent.begin)) >= blocks_to(extent.end);
+}
+
+std::size_t SparseFile::Blocks::first_missing(std::size_t from) const {
+  const auto after = present.upper_bound(from);
+  return after == present.begin() ? from : std::max(from, std::prev(after)->second);
+}
+
+SparseFile::FlightPtr SparseFile::Blocks::flight_of(std::size_t block) const {
+  const auto after = flights.upper_bound(block);
+  if (after == flights.begin() || std::prev(after)->second->end <= block) return nullptr;
+  return std::prev(after)->second;
+}
+
+std::size_t SparseFile::Blocks::end_of_missing(std::size_t from, std::size_t end) const {
+  const auto after = present.upper_bound(from);
+  if (after != present.end()) end = std::min(end, after->first);
+  const auto flight = flights.upper_bound(from);
+  return flight == flights.end() ? end : std::min(end, flight->first);
 }
 
 Extent SparseFile::present_around(std::uint64_t offset, std::uint64_t end) const {
-  const std::lock_guard lock(mutex_);
-  const auto after = present_.upper_bound(block_of(offset));
-  if (after == present_.begin()) return {offset, end};
+  const auto after = blocks_.present.upper_bound(block_of(offset));
+  if (after == blocks_.present.begin()) return {offset, end};
   const auto [first, last] = *std::prev(after);
   return {first * block_bytes, std::min(bytes_, last * block_bytes)};
 }
 
 Result<Extent> SparseFile::fetch(std::uint64_t offset, std::uint64_t count, const Get& get,
-                                 const Cancelled& cancelled) {
-  constexpr std::chrono::milliseconds look_every{100};
+                                 const Cancelled& cancelled, Purpose purpose) {
   offset = std::min(offset, bytes_);
   const std::uint64_t end = offset + std::min(count, bytes_ - offset);
   const std::size_t end_block = blocks_to(end);
   if (offset == end) return Extent{offset, offset};
-  std::size_t missing = first_missing(block_of(offset), end_block).first;
-  if (missing == end_block) return present_around(offset, end);
-  std::unique_lock lock(fetching_, std::defer_lock);
-  while (!lock.try_lock_for(look_every)) {
-    if (cancelled && cancelled()) {
-      return make_error(ErrorKind::cancelled, in_quotes(url_) + " was cancelled");
+  std::unique_lock lock(mutex_);
+  std::size_t at = block_of(offset);
+  while ((at = blocks_.first_missing(at)) < end_block) {
+    if (const auto flight = blocks_.flight_of(at)) {
+      if (purpose == Purpose::ahead) {
+        at = flight->end;
+      } else if (auto done = wait_for(flight, lock, cancelled); !done) {
+        return done.error();
+      }
+      continue;
     }
-  }
-  while ((missing = first_missing(missing, end_block).first) < end_block) {
-    ahead_ = missing == next_ ? std::min(2 * ahead_, blocks_ahead_max) : 1;
-    const std::size_t wanted = std::min(std::max(end_block, missing + ahead_), blocks_to(bytes_));
-    const std::size_t to = first_missing(missing, wanted).second;
-    if (auto done = fetch_blocks(missing, to, get); !done) return done.error();
-    next_ = to;
+    std::size_t to = end_block;
+    if (purpose == Purpose::read) {
+      blocks_.ahead = at == blocks_.next ? std::min(2 * blocks_.ahead, blocks_ahead_max) : 1;
+      to = std::min(std::max(end_block, at + blocks_.ahead), blocks_to(bytes_));
+    }
+    to = blocks_.end_of_missing(at, to);
+    if (purpose == Purpose::read) blocks_.next = to;
+    auto flight = begin_flight(at, to, purpose);
+    if (!flight) return flight.error();
+    lock.unlock();
+    auto done = fetch_blocks(at, *flight, get);
+    lock.lock();
+    if (!done) return done.error();
   }
   return present_around(offset, end);
 }
 
-Result<void> SparseFile::fetch_blocks(std::size_t first, std::size_t end, const Get& get) {
-  const std::uint64_t begin = first * block_bytes;
-  const std::uint64_t wanted = std::min(bytes_, end * block_bytes) - begin;
-  if (fetched_bytes() + wanted > bytes_max_) {
+Result<void> SparseFile::wait_for(const FlightPtr& flight, std::unique_lock<std::mutex>& lock,
+                                  const Cancelled& cancelled) {
+  constexpr std::chrono::milliseconds look_every{100};
+  while (!blocks_.landed.wait_for(lock, look_every, [&] { return flight->has_landed; })) {
+    if (cancelled && cancelled()) {
+      return make_error(ErrorKind::cancelled, in_quotes(url_) + " was cancelled");
+    }
+  }
+  const bool is_shared = flight->error && flight->error->kind != ErrorKind::cancelled &&
+                         flight->purpose == Purpose::read;
+  return is_shared ? Result<void>(*flight->error) : Result<void>();
+}
+
+Result<SparseFile::FlightPtr> SparseFile::begin_flight(std::size_t first, std::size_t end,
+                                                       Purpose purpose) {
+  auto flight = std::make_shared<Flight>();
+  flight->end = end;
+  flight->bytes = std::min(bytes_, end * block_bytes) - first * block_bytes;
+  flight->purpose = purpose;
+  if (blocks_.fetched_bytes + blocks_.flying_bytes + flight->bytes > bytes_max_) {
     return make_error(ErrorKind::too_large,
                       "the parts of " + in_quotes(url_) + " that were read have more than the " +
                           std::to_string(bytes_max_) + " bytes of --max-download");
   }
+  blocks_.flights.emplace(first, flight);
+  blocks_.flying_bytes += flight->bytes;
+  return flight;
+}
+
+// Sends its request; the flight lands whatever happens, so that nobody waits for ever.
+Result<void> SparseFile::fetch_blocks(std::size_t first, const FlightPtr& flight, const Get& get) {
+  Result<void> done = make_error(ErrorKind::cancelled, in_quotes(url_) + " was not received");
+  try {
+    done = fetch_bytes(first * block_bytes, flight->bytes, get);
+  } catch (...) {
+    land(first, *flight, done);
+    throw;
+  }
+  land(first, *flight, done);
+  return done;
+}
+
+Result<void> SparseFile::fetch_bytes(std::uint64_t begin, std::uint64_t wanted, const Get& get) {
   if (!space_.reserve(wanted)) {
     return make_error(ErrorKind::out_of_memory,
                       in_quotes(url_) +
@@ -154,23 +211,36 @@ Result<void> SparseFile::fetch_blocks(std::size_t first, std::size_t end, const 
     came += bytes.size();
     return true;
   });
-  if (!got || came != wanted) {
-    space_.give_back(wanted);
-    if (!got) return got.error();
-    return make_error(ErrorKind::bad_data, in_quotes(url_) + " was received incompletely");
-  }
+  if (got && came == wanted) return {};
+  space_.give_back(wanted);
+  if (!got) return got.error();
+  return make_error(ErrorKind::bad_data, in_quotes(url_) + " was received incompletely");
+}
+
+void SparseFile::land(std::size_t first, Flight& flight, const Result<void>& done) {
   const std::lock_guard lock(mutex_);
-  fetched_bytes_ += wanted;
-  const auto before = present_.lower_bound(first);
-  if (before != present_.begin() && std::prev(before)->second == first) {
+  blocks_.flights.erase(first);
+  blocks_.flying_bytes -= flight.bytes;
+  flight.has_landed = true;
+  blocks_.landed.notify_all();
+  if (!done) {
+    flight.error = done.error();
+    return;
+  }
+  blocks_.fetched_bytes += flight.bytes;
+  blocks_.add(first, flight.end);
+}
+
+void SparseFile::Blocks::add(std::size_t first, std::size_t end) {
+  const auto before = present.lower_bound(first);
+  if (before != present.begin() && std::prev(before)->second == first) {
     first = std::prev(before)->first;
   }
-  if (const auto after = present_.find(end); after != present_.end()) {
+  if (const auto after = present.find(end); after != present.end()) {
     end = after->second;
-    present_.erase(after);
+    present.erase(after);
   }
-  present_[first] = end;
-  return {};
+  present[first] = end;
 }
 
 }  // namespace windsplat::data::fetch

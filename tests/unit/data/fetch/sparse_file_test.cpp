@@ -7,9 +7,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -249,6 +253,143 @@ TEST_F(SparseFiles, StateFollowsTheValidatorAndSize) {
   response.file_bytes = file_bytes;
   EXPECT_NE(SparseFile::make("https://h/a.nc", std::move(*part), response, 1).value()->state(),
             first);
+}
+
+// Requests that end when the test says so.
+class SparseFlights : public SparseFiles {
+ protected:
+  using Outcome = std::future<Result<Extent>>;
+
+  void TearDown() override {
+    answer();
+    SparseFiles::TearDown();
+  }
+  void answer() {
+    if (!std::exchange(is_answered_, true)) answer_.set_value();
+  }
+  // Each request answers with this error, if any.
+  Outcome fetch_later(std::uint64_t offset, std::uint64_t count, std::optional<Error> fault = {},
+                      Purpose purpose = Purpose::read) {
+    const auto get = [this, fault](ByteRange range, const HttpClient::Sink& sink) -> Result<void> {
+      ++requests_;
+      answered_.wait();
+      if (fault) return *fault;
+      EXPECT_TRUE(sink(bytes_of(range)));
+      return {};
+    };
+    // Who waits for the request of another asks whether to give up.
+    const auto cancelled = [this] {
+      ++waiting_;
+      return is_cancelled_.load();
+    };
+    return std::async(std::launch::async, [this, offset, count, get, cancelled, purpose] {
+      return file_->fetch(offset, count, get, cancelled, purpose);
+    });
+  }
+  static void await(const std::atomic<int>& count, int at_least) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (count < at_least && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    ASSERT_GE(count, at_least);
+  }
+
+  std::promise<void> answer_;
+  std::shared_future<void> answered_ = answer_.get_future().share();
+  bool is_answered_ = false;
+  std::atomic<int> requests_ = 0;
+  std::atomic<int> waiting_ = 0;
+  std::atomic<bool> is_cancelled_ = false;
+};
+
+TEST_F(SparseFlights, DifferentBlocksAreFetchedAtTheSameTime) {
+  std::vector<Outcome> readers;
+  for (std::uint64_t i = 0; i < 8; ++i) readers.push_back(fetch_later((5 + 3 * i) * block, 1));
+  await(requests_, 8);
+  answer();
+  for (Outcome& one : readers) EXPECT_TRUE(is_there(one.get().value()));
+  EXPECT_EQ(file_->fetched_bytes(), 9 * block);
+}
+
+TEST_F(SparseFlights, ReadersOfABlockShareItsRequest) {
+  Outcome first = fetch_later(10 * block, 4 * block);
+  await(requests_, 1);
+  Outcome within = fetch_later(12 * block, 1);
+  await(waiting_, 1);
+  Outcome beyond = fetch_later(13 * block, 2 * block);
+  Outcome before = fetch_later(8 * block, 3 * block);
+  await(requests_, 2);
+  answer();
+  for (Outcome* one : {&first, &within, &beyond, &before})
+    EXPECT_TRUE(is_there(one->get().value()));
+  EXPECT_EQ(requests_, 3) << "blocks 10-13, 8-9 and 14";
+  EXPECT_EQ(file_->fetched_bytes(), 8 * block);
+}
+
+TEST_F(SparseFlights, AnErrorReachesAllWhoWaitAndNobodyLater) {
+  Outcome first = fetch_later(10 * block, 1, make_error(ErrorKind::bad_data, "the host failed"));
+  await(requests_, 1);
+  Outcome second = fetch_later(10 * block, 1);
+  await(waiting_, 1);
+  answer();
+  for (Outcome* one : {&first, &second}) {
+    const auto failed = one->get();
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().message, "the host failed");
+  }
+  EXPECT_EQ(requests_, 1);
+  EXPECT_TRUE(fetch(10 * block, 1));
+}
+
+TEST_F(SparseFlights, ErrorsThatAreNotOfAReaderHaveHimAskAgain) {
+  Outcome gone = fetch_later(10 * block, 1, make_error(ErrorKind::cancelled, "it left"));
+  Outcome ahead = fetch_later(20 * block, 1, make_error(ErrorKind::bad_data, "the host failed"),
+                              Purpose::ahead);
+  await(requests_, 2);
+  Outcome first = fetch_later(10 * block, 1);
+  Outcome second = fetch_later(20 * block, 1);
+  await(waiting_, 2);
+  answer();
+  EXPECT_FALSE(gone.get());
+  EXPECT_FALSE(ahead.get());
+  EXPECT_TRUE(is_there(first.get().value()));
+  EXPECT_TRUE(is_there(second.get().value()));
+  EXPECT_EQ(requests_, 4);
+}
+
+TEST_F(SparseFlights, WhoWaitsCanBeCancelled) {
+  Outcome first = fetch_later(10 * block, 1);
+  await(requests_, 1);
+  Outcome second = fetch_later(10 * block, 1);
+  await(waiting_, 1);
+  is_cancelled_ = true;
+  const auto left = second.get();
+  ASSERT_FALSE(left);
+  EXPECT_EQ(left.error().kind, ErrorKind::cancelled);
+  answer();
+  EXPECT_TRUE(first.get());
+}
+
+TEST_F(SparseFlights, AheadOnlyWhatNobodyFetchesIsAskedFor) {
+  Outcome reader = fetch_later(10 * block, 2 * block);
+  await(requests_, 1);
+  Outcome ahead = fetch_later(9 * block, 5 * block, {}, Purpose::ahead);
+  await(requests_, 2);
+  EXPECT_EQ(waiting_, 0);
+  answer();
+  EXPECT_TRUE(ahead.get());
+  EXPECT_TRUE(reader.get());
+  EXPECT_EQ(requests_, 3) << "blocks 9 and 12-13 beside those of the reader";
+  EXPECT_EQ(file_->fetched_bytes(), 6 * block);
+}
+
+TEST_F(SparseFlights, WhatIsUnderWayCountsInTheLimit) {
+  make(3 * block);
+  Outcome first = fetch_later(10 * block, 2 * block);
+  await(requests_, 1);
+  const auto refused = fetch(20 * block, 1);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::too_large);
+  answer();
+  EXPECT_TRUE(first.get());
 }
 
 TEST(ContentRange, IsReadOnlyIfItIsWhole) {
