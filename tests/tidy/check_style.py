@@ -25,6 +25,7 @@ LARGE_CLASSES = {
     ("server/data/cf/source.cpp", "ArraySource"): ONE_FORMAT,
     ("server/data/formats/grib/file.hpp", "File"): ONE_FORMAT,
     ("server/data/formats/netcdf/file.hpp", "File"): ONE_FORMAT,
+    ("server/data/formats/zarr/store.hpp", "Store"): ONE_FORMAT,
     ("server/data/formats/vtk/source.cpp", "VtkSource"): ONE_FORMAT,
     ("server/data/formats/vtk/legacy.cpp", "Reader"): "a function for each section of the format",
     ("server/data/resident/budget.hpp", "Budget"): "all is guarded by one mutex",

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "server/data/fetch/ahead.hpp"
 #include "server/data/fetch/fetcher.hpp"
 #include "server/data/files/url.hpp"
 
@@ -15,31 +16,31 @@ namespace {
 class FetchedFiles final : public Files {
  public:
   FetchedFiles(Fetcher& fetcher, Location location, Cancelled cancelled)
-      : fetcher_(fetcher), location_(std::move(location)), cancelled_(std::move(cancelled)) {}
+      : fetcher_(fetcher),
+        location_(std::move(location)),
+        cancelled_(std::move(cancelled)),
+        ahead_(fetcher) {}
   [[nodiscard]] const Location& location() const override { return location_; }
 
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
-    if (fault_) return *fault_;  // as in fetch_part
-    const auto url = url_of(name);
-    if (!url) return url.error();
     // Files of a folder are small, or chunks that are read as a whole.
     const bool is_whole = location_.kind == Location::Kind::folder || location_.service;
-    const Fetch how = is_whole ? Fetch::whole : Fetch::parts;
-    auto fetched = fetcher_.fetch(*url, how, cancelled_);
-    if (!fetched) return fetched.error();
-    FileParts parts{0, std::move(fetched->state)};
-    if (fetched->parts) {
-      if (parts_.size() >= location_.members.size() + open_besides_members_max) {
-        return make_error(ErrorKind::bad_data, in_quotes(name) + ": too many files are open");
-      }
-      parts.number = ++last_number_;
-      parts_[parts.number] = {*url, std::move(fetched->parts)};
-    }
-    auto file = InputFile::adopt(fetched->file.give(), name.substr(name.find_last_of('/') + 1),
-                                 std::move(parts));
-    if (file) count_opened(name, (*file)->size());
-    return file;
+    return open_as(name, is_whole ? Fetch::whole : Fetch::parts);
   }
+
+  Result<std::shared_ptr<const InputFile>> open_parts(const std::string& name) override {
+    return open_as(name, location_.service ? Fetch::whole : Fetch::parts);
+  }
+
+  void expect(const Expected& what) override {
+    const auto url = url_of(what.name);
+    if (!url || location_.service) return;
+    const auto open = std::find_if(parts_.begin(), parts_.end(),
+                                   [&](const auto& one) { return one.second.url == *url; });
+    ahead_.expect(*url, open == parts_.end() ? nullptr : open->second.file, what);
+  }
+
+  void forget_expected() override { ahead_.forget(); }
 
   Result<Extent> fetch_part(std::uint64_t number, std::uint64_t offset,
                             std::uint64_t count) override {
@@ -47,10 +48,15 @@ class FetchedFiles final : public Files {
     if (at == parts_.end()) return make_error(ErrorKind::not_found, "no such file is open");
     // Libraries read on after a fault, and each request may take as long as the first.
     if (fault_) return *fault_;
-    auto out = fetcher_.fetch_part(at->second.url, *at->second.file, offset, count, cancelled_);
+    const Parts& of = at->second;
+    auto out = fetcher_.fetch_part(of.url, *of.file, offset, count, cancelled_);
+    if (!out && out.error().kind == ErrorKind::out_of_memory && ahead_.give_way()) {
+      out = fetcher_.fetch_part(of.url, *of.file, offset, count, cancelled_);
+    }
+    if (out) ahead_.note_read(*of.file, *out);
     if (out) return out;
     fault_ = out.error();
-    is_unfit_ = fetcher_.is_unfit(at->second.file->url());
+    is_unfit_ = fetcher_.is_unfit(of.file->url());
     return out;
   }
 
@@ -77,6 +83,32 @@ class FetchedFiles final : public Files {
   [[nodiscard]] bool is_unfit_for_parts() const override { return is_unfit_; }
 
  private:
+  struct Parts {
+    std::string url;
+    std::shared_ptr<SparseFile> file;
+  };
+
+  Result<std::shared_ptr<const InputFile>> open_as(const std::string& name, Fetch how) {
+    if (fault_) return *fault_;  // as in fetch_part
+    const auto url = url_of(name);
+    if (!url) return url.error();
+    auto known = ahead_.take(*url, cancelled_);
+    auto fetched = known ? std::move(*known) : fetcher_.fetch(*url, how, cancelled_);
+    if (!fetched) return fetched.error();
+    FileParts parts{0, std::move(fetched->state)};
+    if (fetched->parts) {
+      if (parts_.size() >= location_.members.size() + open_besides_members_max) {
+        return make_error(ErrorKind::bad_data, in_quotes(name) + ": too many files are open");
+      }
+      parts.number = ++last_number_;
+      parts_[parts.number] = {*url, std::move(fetched->parts)};
+    }
+    auto file = InputFile::adopt(fetched->file.give(), name.substr(name.find_last_of('/') + 1),
+                                 std::move(parts));
+    if (file) count_opened(name, (*file)->size());
+    return file;
+  }
+
   static Error not_permitted(const std::string& name) {
     return make_error(ErrorKind::not_found, in_quotes(name) + " is not a file of this dataset");
   }
@@ -115,12 +147,9 @@ class FetchedFiles final : public Files {
   Cancelled cancelled_;
   std::optional<Error> fault_;
   bool is_unfit_ = false;
-  struct Parts {
-    std::string url;
-    std::shared_ptr<SparseFile> file;
-  };
   std::map<std::uint64_t, Parts> parts_;  // by number
   std::uint64_t last_number_ = 0;
+  Ahead ahead_;
 };
 
 }  // namespace

@@ -9,7 +9,10 @@ namespace windsplat::data::fetch {
 
 namespace {
 
-constexpr std::size_t idle_clients_max = 8;
+constexpr std::size_t idle_clients_max = 16;
+constexpr int ahead_threads_max = 32;
+constexpr std::uint64_t ahead_bytes_max = std::uint64_t{64} << 20;
+constexpr std::uint64_t ahead_share = 4;    // of the cache
 constexpr std::size_t idle_parts_max = 64;  // files open without a reader
 constexpr std::uint64_t kept_share = 4;     // of the cache, for a file that was read to its end
 constexpr std::size_t list_entries_max = 1'000'000;
@@ -42,7 +45,10 @@ Error fault_of_part(const Url& url, const SparseFile& file, const std::string& e
 }  // namespace
 
 Fetcher::Fetcher(FetchOptions options)
-    : options_(std::move(options)), rules_(std::make_shared<const HostRules>(options_.rules)) {}
+    : options_(std::move(options)), rules_(std::make_shared<const HostRules>(options_.rules)) {
+  ahead_.all_bytes_max = options_.cache.bytes_max / ahead_share;
+  ahead_.bytes_max = std::min(ahead_bytes_max, ahead_.all_bytes_max);
+}
 
 Result<std::unique_ptr<Fetcher>> Fetcher::open(FetchOptions options) {
   std::unique_ptr<Fetcher> out(new Fetcher(std::move(options)));
@@ -92,13 +98,17 @@ Result<Response> Fetcher::get(const Request& request, const HttpClient::Sink& si
   return response;
 }
 
-Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Cancelled& cancelled) {
+Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Cancelled& cancelled,
+                                   Purpose purpose) {
   const std::size_t mark = std::min(text.find('?'), text.size());
   const auto url = parse_url(std::string_view(text).substr(0, mark));
   if (!url) return url.error();
   auto request = request_of(*url, cancelled);
   if (!request) return request.error();
   if (mark < text.size()) request->query = text.substr(mark + 1);
+  if (purpose == Purpose::ahead) {
+    request->limits.bytes_max = std::min(request->limits.bytes_max, ahead_.bytes_max);
+  }
   const std::string key = request->url.text() + text.substr(mark);
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
   const bool wants_parts = how == Fetch::parts;
@@ -149,7 +159,8 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
 }
 
 Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, std::uint64_t offset,
-                                   std::uint64_t count, const Cancelled& cancelled) {
+                                   std::uint64_t count, const Cancelled& cancelled,
+                                   Purpose purpose) {
   const auto url = parse_url(text);
   if (!url) return url.error();
   auto request = request_of(*url, cancelled);
@@ -166,12 +177,18 @@ Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, st
     return fault_of_part(request->url, file, response->validators.etag);
   };
   drop_idle_parts(std::min(count, file.bytes()));
-  auto out = file.fetch(offset, count, get_bytes, request->cancelled);
+  auto out = file.fetch(offset, count, get_bytes, request->cancelled, purpose);
   if (out && file.fetched_bytes() >= file.bytes()) keep_whole(file);
   if (out) return out;
   const ErrorKind kind = out.error().kind;
   if (kind == ErrorKind::bad_data || kind == ErrorKind::not_found) forget_parts(file.url());
   return out;
+}
+
+bool Fetcher::AheadLimits::begin() {
+  if (++threads <= ahead_threads_max) return true;
+  --threads;
+  return false;
 }
 
 // It is in use as it is: what cannot be kept is fetched again by the next program.

@@ -55,18 +55,33 @@ class Fetcher {
   // The file at a URL of https, http or s3, from the cache if its host confirms it, or did so
   // recently. A URL may have a percent-encoded query. Errors: those of HttpClient::get(),
   // out_of_memory if it cannot be stored.
-  Result<FetchedFile> fetch(const std::string& url, Fetch how, const Cancelled& cancelled);
+  // Ahead, files of more than AheadLimits::bytes_max are left to the reader: too_large.
+  Result<FetchedFile> fetch(const std::string& url, Fetch how, const Cancelled& cancelled,
+                            Purpose purpose = Purpose::read);
   // Bytes of a file that is here in parts, which is that of the URL; the file is kept in the cache
   // when all are present. Errors: those of SparseFile::fetch() and HttpClient::get(), after which
   // the next to open it asks for its state.
   Result<Extent> fetch_part(const std::string& url, SparseFile& file, std::uint64_t offset,
-                            std::uint64_t count, const Cancelled& cancelled);
+                            std::uint64_t count, const Cancelled& cancelled,
+                            Purpose purpose = Purpose::read);
   // Whether parts that do not fit together were received of a file (SparseFile::url()) that is thus
   // fetched as a whole when it is opened next.
   [[nodiscard]] bool is_unfit(const std::string& key) { return noted_.is_unfit(key); }
   // Names directly below a folder of an S3 service, sorted; folders end in '/'. Errors: bad_data,
   // also for other hosts, which have no lists.
   Result<std::vector<std::string>> list(const std::string& folder_url, const Cancelled& cancelled);
+
+  // What may be fetched ahead of its readers.
+  struct AheadLimits {
+    std::uint64_t bytes_max = 0;                  // of a dataset, on disk before they are read
+    std::uint64_t all_bytes_max = 0;              // of parts of all datasets, about
+    std::atomic<std::uint64_t> unread_bytes = 0;  // of these
+    std::atomic<int> threads = 0;
+    // One more thread. False: there are enough of them.
+    [[nodiscard]] bool begin();
+    void end() { --threads; }
+  };
+  [[nodiscard]] AheadLimits& ahead_limits() { return ahead_; }
 
   // Ends all present and future requests.
   void end() { ended_ = true; }
@@ -96,6 +111,7 @@ class Fetcher {
   std::shared_ptr<const HostRules> rules_;
   std::unique_ptr<ObjectCache> cache_;
   std::atomic<bool> ended_ = false;
+  AheadLimits ahead_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<HttpClient>> idle_;  // guarded by the mutex
   std::list<KnownParts> parts_;                    // guarded by the mutex

@@ -76,6 +76,14 @@ struct Extent {
   std::uint64_t end = 0;
 };
 
+// What a reader will read soon of a file.
+struct Expected {
+  std::string name;
+  bool in_parts = false;             // by Files::open_parts()
+  std::uint64_t tail_bytes = 0;      // its last bytes
+  std::vector<Extent> extents = {};  // once it is open in parts
+};
+
 // Files that a dataset may have open besides its members.
 inline constexpr std::size_t open_besides_members_max = 256;
 
@@ -86,6 +94,14 @@ class Files {
   // `name`: a member, or a companion relative to the folder, with '/' as separator; never above the
   // folder. Errors: not_found, bad_data.
   virtual Result<std::shared_ptr<const InputFile>> open(const std::string& name) = 0;
+  // The same; only what is read of a fetched file is fetched, if its host sends parts.
+  virtual Result<std::shared_ptr<const InputFile>> open_parts(const std::string& name) {
+    return open(name);
+  }
+  // A hint to fetch it before it is asked for, while other files are read; has no errors.
+  virtual void expect(const Expected& /*what*/) {}
+  // What was expected and not read is not wanted any more.
+  virtual void forget_expected() {}
   // Entries of the folder or, unless empty, of `below` in it, sorted; folders end in '/'. Errors:
   // not_found, bad_data.
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;

@@ -36,6 +36,8 @@ enum class Kind : std::uint32_t {
   ask_bytes,    // loader -> daemon: number of parts, offset, count -> extent, or no without payload
   extent,       // daemon -> loader: bytes that are present
   close_parts,  // loader -> daemon: number of parts; no answer
+  ask_parts,    // loader -> daemon: as ask_open, of a file that is to be read in parts
+  expect,       // loader -> daemon: what will be asked for soon (Expected); no answer
   // of volumes that are passed in parts
   part,   // loader -> daemon: component, layers and half of the window -> taken, in order
   taken,  // daemon -> loader: that half may be overwritten

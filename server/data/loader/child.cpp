@@ -59,7 +59,34 @@ class BrokeredFiles final : public Files {
   [[nodiscard]] const Location& location() const override { return location_; }
 
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
-    Message answer = ask(Kind::ask_open, name);
+    return open_by(Kind::ask_open, name);
+  }
+  Result<std::shared_ptr<const InputFile>> open_parts(const std::string& name) override {
+    return open_by(Kind::ask_parts, name);
+  }
+  void expect(const Expected& what) override {
+    constexpr std::size_t name_bytes_max = 4096;
+    if (!location_.fetched || what.name.size() > name_bytes_max) return;
+    Expected part = what;
+    for (std::size_t at = 0; at == 0 || at < what.extents.size(); at += expected_extents_max) {
+      const std::size_t end = std::min(what.extents.size(), at + expected_extents_max);
+      part.extents.assign(what.extents.begin() + static_cast<std::ptrdiff_t>(at),
+                          what.extents.begin() + static_cast<std::ptrdiff_t>(end));
+      say(Kind::expect, encode_expected(part));
+    }
+  }
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    const Message answer = ask(Kind::ask_list, folder);
+    if (answer.kind != Kind::names) return decode_error(answer.payload);
+    return decode_names(answer.payload);
+  }
+  bool exists(const std::string& name) override {
+    return ask(Kind::ask_exists, name).kind == Kind::yes;
+  }
+
+ private:
+  Result<std::shared_ptr<const InputFile>> open_by(Kind how, const std::string& name) {
+    Message answer = ask(how, name);
     if (answer.kind != Kind::descriptor) return decode_error(answer.payload);
     auto parts = decode_parts(answer.payload);
     if (!parts) return parts.error();
@@ -80,16 +107,7 @@ class BrokeredFiles final : public Files {
                                               say(Kind::close_parts, out.bytes());
                                             });
   }
-  Result<std::vector<std::string>> list(const std::string& folder) override {
-    const Message answer = ask(Kind::ask_list, folder);
-    if (answer.kind != Kind::names) return decode_error(answer.payload);
-    return decode_names(answer.payload);
-  }
-  bool exists(const std::string& name) override {
-    return ask(Kind::ask_exists, name).kind == Kind::yes;
-  }
 
- private:
   static Message ask(Kind what, const std::string& name) {
     Message out;
     if (name.size() > question_bytes_max) {

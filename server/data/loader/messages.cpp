@@ -452,6 +452,34 @@ Result<FileParts> decode_parts(std::string_view bytes) {
   return make_error(ErrorKind::internal, "an answer of the daemon is malformed");
 }
 
+std::string encode_expected(const Expected& expected) {
+  Writer out;
+  out.text(expected.name);
+  out.number(static_cast<std::uint8_t>(expected.in_parts ? 1 : 0));
+  out.number(expected.tail_bytes);
+  out.count(expected.extents.size());
+  for (const Extent& one : expected.extents) {
+    out.number(one.begin);
+    out.number(one.end);
+  }
+  return out.take();
+}
+
+Result<Expected> decode_expected(std::string_view bytes) {
+  Reader in(bytes);
+  Expected out;
+  out.name = in.text(question_bytes_max);
+  out.in_parts = in.number<std::uint8_t>() != 0;
+  out.tail_bytes = in.number<std::uint64_t>();
+  out.extents.resize(in.count(expected_extents_max, sizeof(Extent)));
+  for (Extent& one : out.extents) {
+    one.begin = in.number<std::uint64_t>();
+    one.end = in.number<std::uint64_t>();
+  }
+  if (in.complete()) return out;
+  return make_error(ErrorKind::internal, "what is expected is malformed");
+}
+
 std::string encode_names(const std::vector<std::string>& names) {
   Writer out;
   put_texts(out, names);

@@ -56,6 +56,11 @@ Result<DatasetInfo> decode_info(std::string_view bytes);
 std::string encode_parts(const FileParts& parts);
 Result<FileParts> decode_parts(std::string_view bytes);
 
+// At most expected_extents_max extents. Errors: internal.
+inline constexpr std::size_t expected_extents_max = 2048;
+std::string encode_expected(const Expected& expected);
+Result<Expected> decode_expected(std::string_view bytes);
+
 std::string encode_names(const std::vector<std::string>& names);
 Result<std::vector<std::string>> decode_names(std::string_view bytes);
 

@@ -72,6 +72,7 @@ std::string seconds_text(std::chrono::milliseconds time) {
 
 // The loader's answer, or the error that its files have met instead.
 Result<Message> checked(Files& files, Message heard) {
+  files.forget_expected();
   if (auto fault = files.take_fault()) return std::move(*fault);
   if (heard.kind == Kind::failed) return decode_error(heard.payload);
   return heard;
@@ -259,8 +260,9 @@ Fate RunningLoader::answer(const Message& question, Kind during, Patience& patie
   };
   const std::string& name = question.payload;
   if (name.size() > question_bytes_max) return Fate::broken;
-  if (question.kind == Kind::ask_open) {
-    const auto file = files_->open(name);
+  if (question.kind == Kind::ask_open || question.kind == Kind::ask_parts) {
+    const bool in_parts = question.kind == Kind::ask_parts;
+    const auto file = in_parts ? files_->open_parts(name) : files_->open(name);
     if (during == Kind::open) process_.allow_memory(opening_memory_bytes(files_->opened_bytes()));
     return file ? say(Kind::descriptor, encode_parts((*file)->parts()), (*file)->descriptor())
                 : say(Kind::no, encode_error(file.error()));
@@ -277,6 +279,12 @@ Fate RunningLoader::answer(const Message& question, Kind during, Patience& patie
     out.number(extent->begin);
     out.number(extent->end);
     return say(Kind::extent, out.bytes());
+  }
+  if (question.kind == Kind::expect) {
+    const auto expected = decode_expected(question.payload);
+    if (!expected) return Fate::broken;
+    files_->expect(*expected);
+    return Fate::done;
   }
   if (question.kind == Kind::close_parts) {
     Reader in(question.payload);

@@ -13,6 +13,7 @@
 #include "server/base/ascii.hpp"
 #include "server/data/formats/zarr/codec.hpp"
 #include "server/data/formats/zarr/half.hpp"
+#include "server/data/formats/zarr/look_ahead.hpp"
 #include "server/data/formats/zarr/shard.hpp"
 #include "server/data/formats/zarr/store.hpp"
 
@@ -74,16 +75,6 @@ CopyRow<Out> copier(const Dtype& type) {
   }
 }
 
-// Advances an index within lengths, last dimension fastest; false after the last index.
-bool advance(std::vector<std::size_t>& place, const std::vector<std::size_t>& first,
-             const std::vector<std::size_t>& last, std::size_t dimensions) {
-  for (std::size_t d = dimensions; d-- > 0;) {
-    if (++place[d] <= last[d]) return true;
-    place[d] = first[d];
-  }
-  return false;
-}
-
 // The part of one chunk that lies in a block.
 struct Overlap {
   std::vector<std::size_t> in_chunk;  // its first item
@@ -134,31 +125,6 @@ std::vector<std::size_t> in_order(std::size_t rank) {
   return out;
 }
 
-// A chunk of an array: its file, and its place in that file's index.
-struct ChunkPlace {
-  std::uint64_t file = 0;
-  std::size_t in_file = 0;
-  std::size_t per_file = 1;
-  [[nodiscard]] std::uint64_t number() const { return file * per_file + in_file; }
-};
-
-// place: indices of the chunk in the grid of all chunks.
-ChunkPlace place_of(const ArrayMetadata& array, const std::vector<std::size_t>& place) {
-  ChunkPlace out;
-  const std::vector<std::size_t>& shape = array.file_shape();
-  std::vector<std::size_t> along;  // chunks of a file
-  for (std::size_t d = 0; d < place.size(); ++d) {
-    along.push_back(shape[d] / array.chunks[d]);
-    out.file = out.file * files_along(array, d) + place[d] / along[d];
-    out.per_file *= along[d];
-  }
-  const auto strides = strides_of(along, array.shard ? array.shard->order : in_order(place.size()));
-  for (std::size_t d = 0; d < place.size(); ++d) {
-    out.in_file += place[d] % along[d] * strides[d];
-  }
-  return out;
-}
-
 // The value of absent chunks; NaN (masked) if undefined or not representable as float.
 double absent_value(const ArrayMetadata& array, bool as_float) {
   constexpr double masked = std::numeric_limits<double>::quiet_NaN();
@@ -180,9 +146,8 @@ void copy_overlap(const ArrayMetadata& array, const ChunkBytes& bytes, const Ove
   const std::size_t row = rank == 0 ? 1 : part.count.back();
   const std::size_t row_stride = rank == 0 ? item : from.back() * item;
   std::vector<std::size_t> place(rank, 0);
-  const std::vector<std::size_t> first(rank, 0);
-  std::vector<std::size_t> last = part.count;
-  for (std::size_t& end : last) --end;
+  ChunkRange all{std::vector<std::size_t>(rank, 0), part.count};
+  for (std::size_t& last : all.last) --last;
   do {
     std::size_t source = 0;
     std::size_t target = 0;
@@ -195,10 +160,51 @@ void copy_overlap(const ArrayMetadata& array, const ChunkBytes& bytes, const Ove
     } else {
       copy(bytes.data() + source * item, row_stride, row, out + target);
     }
-  } while (rank > 0 && advance(place, first, last, rank - 1));
+  } while (rank > 0 && advance(place, all, rank - 1));
 }
 
 }  // namespace
+
+bool advance(std::vector<std::size_t>& place, const ChunkRange& range, std::size_t dimensions) {
+  for (std::size_t d = dimensions; d-- > 0;) {
+    if (++place[d] <= range.last[d]) return true;
+    place[d] = range.first[d];
+  }
+  return false;
+}
+
+std::uint64_t number_of_file(const ArrayMetadata& array, const std::vector<std::size_t>& file) {
+  std::uint64_t out = 0;
+  for (std::size_t d = 0; d < file.size(); ++d) out = out * files_along(array, d) + file[d];
+  return out;
+}
+
+ChunkRange chunks_in(const ArrayMetadata& array, const std::vector<std::size_t>& file,
+                     const ChunkRange& chunks) {
+  ChunkRange out = chunks;
+  for (std::size_t d = 0; d < file.size(); ++d) {
+    const std::size_t along = array.file_shape()[d] / array.chunks[d];
+    out.first[d] = std::max(out.first[d], file[d] * along);
+    out.last[d] = std::min(out.last[d], file[d] * along + along - 1);
+  }
+  return out;
+}
+
+ChunkPlace place_of(const ArrayMetadata& array, const std::vector<std::size_t>& place) {
+  ChunkPlace out;
+  const std::vector<std::size_t>& shape = array.file_shape();
+  std::vector<std::size_t> along;  // chunks of a file
+  for (std::size_t d = 0; d < place.size(); ++d) {
+    along.push_back(shape[d] / array.chunks[d]);
+    out.file = out.file * files_along(array, d) + place[d] / along[d];
+    out.per_file *= along[d];
+  }
+  const auto strides = strides_of(along, array.shard ? array.shard->order : in_order(place.size()));
+  for (std::size_t d = 0; d < place.size(); ++d) {
+    out.in_file += place[d] % along[d] * strides[d];
+  }
+  return out;
+}
 
 std::uint64_t file_count(const ArrayMetadata& array) {
   std::uint64_t count = 1;
@@ -233,7 +239,7 @@ void Store::forget_chunks(int variable) const {
 
 Result<Store::File> Store::open_file(const Array& array, std::uint64_t number) const {
   const std::string path = array.path + file_key(array.metadata, number);
-  auto input = files_->open(path);
+  auto input = array.metadata.shard ? files_->open_parts(path) : files_->open(path);
   if (!input && input.error().kind != ErrorKind::not_found) return input.error();
   File out;
   out.path = path;
@@ -247,7 +253,7 @@ Error Store::fault(const std::string& path, const std::string& what) const {
 }
 
 Result<const Store::OpenShard*> Store::shard_at(const Array& array, std::uint64_t number) const {
-  if (const OpenShard* const kept = shards_.find(number)) return kept;
+  if (OpenShard* const kept = shards_.find(number)) return reopened(array, number, *kept);
   auto file = open_file(array, number);
   if (!file) return file.error();
   OpenShard shard;
@@ -256,10 +262,34 @@ Result<const Store::OpenShard*> Store::shard_at(const Array& array, std::uint64_
     auto index = read_index(array.metadata, *shard.file.input);
     if (!index) return fault(shard.file.path, index.error().message);
     shard.index = std::move(*index);
+    shard.identity = shard.file.input->identity();
   }
   const std::size_t bytes = shard.index.size() * sizeof(Span) + open_file_bytes;
   shards_.evict_for(bytes, kept_shards_bytes);
   return shards_.add(number, std::move(shard), bytes);
+}
+
+Result<const Store::OpenShard*> Store::reopened(const Array& array, std::uint64_t number,
+                                                OpenShard& kept) const {
+  if (kept.file.input || kept.index.empty()) return &kept;
+  auto file = open_file(array, number);
+  if (!file) return file.error();
+  bool is_same = file->input && file->input->identity() == kept.identity;
+  // A file that is fetched as a whole by now has another identity.
+  if (!is_same && file->input && file->input->parts().number == 0) {
+    const auto index = read_index(array.metadata, *file->input);
+    is_same = index && *index == kept.index;
+  }
+  if (!is_same) return fault(kept.file.path, "has changed since it was opened; open it again");
+  kept.file = std::move(*file);
+  return &kept;
+}
+
+// What is on disk of a file in parts may then be removed, where room is needed.
+void Store::close_parts(std::uint64_t number) const {
+  if (!shards_.has(number)) return;
+  OpenShard& shard = *shards_.find(number);
+  if (shard.file.input && shard.file.input->parts().number != 0) shard.file.input.reset();
 }
 
 Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
@@ -313,12 +343,12 @@ cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
   const ArrayMetadata& metadata = array.metadata;
   if (!std::isnan(absent_value(metadata, false))) return {};
   std::size_t chunks = 1;
-  std::vector<std::size_t> last;
+  ChunkRange all{std::vector<std::size_t>(metadata.shape.size(), 0), {}};
   for (std::size_t d = 0; d < metadata.shape.size(); ++d) {
     const std::size_t along = count_along(metadata.shape[d], metadata.chunks[d]);
     if (along == 0) return {};
     chunks *= along;
-    last.push_back(along - 1);
+    all.last.push_back(along - 1);
   }
   cf::Unwritten out;
   out.looked_at = std::min(chunks, most);
@@ -329,14 +359,13 @@ cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
   }
   const std::lock_guard lock(mutex_);
   shards_.select(variable);
-  const std::vector<std::size_t> first(last.size(), 0);
-  std::vector<std::size_t> place = first;
+  std::vector<std::size_t> place = all.first;
   for (std::size_t i = 0; i < out.looked_at; ++i) {
     const ChunkPlace at = place_of(metadata, place);
     const auto shard = shard_at(array, at.file);
     if (!shard) return {};  // the error is that of reading it
     out.chunks += (*shard)->is_absent(at.in_file) ? 1 : 0;
-    advance(place, first, last, place.size());
+    advance(place, all, place.size());
   }
   return out;
 }
@@ -352,28 +381,28 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
   const ArrayMetadata& array = of.metadata;
   const std::vector<std::size_t>& shape = array.file_shape();
   const std::size_t rank = start.size();
-  std::vector<std::size_t> first_file;
-  std::vector<std::size_t> last_file;
+  ChunkRange chunks;
+  ChunkRange files;
   std::size_t needed = array.chunk_items() * array.dtype.bytes + kept_.bookkeeping_bytes;
   for (std::size_t d = 0; d < rank; ++d) {
     if (count[d] == 0) return {};
     const std::size_t end = start[d] + count[d] - 1;
-    first_file.push_back(start[d] / shape[d]);
-    last_file.push_back(end / shape[d]);
-    const std::size_t along = end / array.chunks[d] - start[d] / array.chunks[d] + 1;
+    files.first.push_back(start[d] / shape[d]);
+    files.last.push_back(end / shape[d]);
+    chunks.first.push_back(start[d] / array.chunks[d]);
+    chunks.last.push_back(end / array.chunks[d]);
+    const std::size_t along = chunks.last[d] - chunks.first[d] + 1;
     needed = needed > kept_bytes_most / along ? kept_bytes_most : needed * along;
   }
   const std::lock_guard lock(mutex_);
-  std::vector<std::size_t> file = first_file;
+  kept_.select(variable);
+  shards_.select(variable);
+  std::vector<std::size_t> file = files.first;
+  Outlook outlook(files, chunks);
   do {  // one file after the other
-    std::vector<std::size_t> first(rank);
-    std::vector<std::size_t> last(rank);
-    for (std::size_t d = 0; d < rank; ++d) {
-      const std::size_t along = shape[d] / array.chunks[d];
-      first[d] = std::max(start[d] / array.chunks[d], file[d] * along);
-      last[d] = std::min((start[d] + count[d] - 1) / array.chunks[d], file[d] * along + along - 1);
-    }
-    std::vector<std::size_t> place = first;
+    if (files_->location().fetched) look_ahead(of, outlook);
+    const ChunkRange here = chunks_in(array, file, chunks);
+    std::vector<std::size_t> place = here.first;
     do {
       const auto chunk = chunk_at(variable, place, std::max(needed, kept_bytes_least));
       if (!chunk) return chunk.error();
@@ -384,8 +413,9 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
       const std::size_t items = product(part.count);
       (*chunk)->unread_items -= std::min(items, (*chunk)->unread_items);
       if ((*chunk)->unread_items == 0) kept_.drop_newest();
-    } while (advance(place, first, last, rank));
-  } while (advance(file, first_file, last_file, rank));
+    } while (advance(place, here, rank));
+    if (array.shard) close_parts(number_of_file(array, file));
+  } while (advance(file, files, rank));
   return {};
 }
 

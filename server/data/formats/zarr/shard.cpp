@@ -20,11 +20,17 @@ std::uint64_t number_at(const unsigned char* bytes, bool big_endian) {
 
 }  // namespace
 
-Result<std::vector<Span>> read_index(const ArrayMetadata& array, const InputFile& file) {
+std::size_t index_bytes(const ArrayMetadata& array) {
   const Shard& shard = *array.shard;
   std::size_t count = 1;
   for (std::size_t d = 0; d < shard.shape.size(); ++d) count *= shard.shape[d] / array.chunks[d];
-  const std::size_t bytes = count * sizeof(Span) + (shard.index_checked ? crc32c_bytes : 0);
+  return count * sizeof(Span) + (shard.index_checked ? crc32c_bytes : 0);
+}
+
+Result<std::vector<Span>> read_index(const ArrayMetadata& array, const InputFile& file) {
+  const Shard& shard = *array.shard;
+  const std::size_t bytes = index_bytes(array);
+  const std::size_t count = bytes / sizeof(Span);
   if (file.size() < bytes) {
     return broken_index("is truncated: it has " + std::to_string(file.size()) +
                         " bytes, and its index " + std::to_string(bytes));

@@ -22,7 +22,9 @@ namespace windsplat::data::zarr {
 // Whether a folder is a Zarr store.
 bool is_store(Files& files);
 
+struct ChunkRange;
 struct LevelStore;
+struct Outlook;
 
 // Conventions of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and in version 2 fill_value is
 // _FillValue.
@@ -66,6 +68,7 @@ class Store final : public cf::ArrayFile {
   struct OpenShard {
     File file;
     std::vector<Span> index;  // empty if the file is absent
+    std::string identity;     // of a file in parts, which is closed once a block has its chunks
     [[nodiscard]] bool is_absent(std::size_t chunk) const {
       return index.empty() || index[chunk].bytes == absent_span;
     }
@@ -85,6 +88,12 @@ class Store final : public cf::ArrayFile {
   Result<ChunkBytes> load(const Array& array, std::uint64_t file_number, std::size_t in_file) const;
   Result<const OpenShard*> shard_at(const Array& array, std::uint64_t number) const;
   Result<File> open_file(const Array& array, std::uint64_t number) const;
+  Result<const OpenShard*> reopened(const Array& array, std::uint64_t number,
+                                    OpenShard& kept) const;
+  // Tells of a store that is fetched what is read of the next files of a block.
+  void look_ahead(const Array& array, Outlook& outlook) const;
+  void expect_chunks(const Array& array, std::uint64_t number, const ChunkRange& chunks) const;
+  void close_parts(std::uint64_t number) const;
   [[nodiscard]] Error fault(const std::string& path, const std::string& what) const;
 
   std::shared_ptr<Files> files_;

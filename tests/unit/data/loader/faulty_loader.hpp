@@ -68,7 +68,7 @@ class FaultyLoader : public testing::Test {
     script += "s = socket.socket(fileno=3)\n";
     script += "names = 'open read descriptor names yes no ask_open ask_list ask_exists ";
     script += "ask_library progress opened filled failed ";
-    script += "ask_bytes extent close_parts part taken whole ";
+    script += "ask_bytes extent close_parts ask_parts expect part taken whole ";
     script += "unpack entries entry entry_bytes unpacked'.split()\n";
     script += "K = {name: i + 1 for i, name in enumerate(names)}\n";
     script += "def send(kind, payload=b''):\n";

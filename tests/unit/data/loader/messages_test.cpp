@@ -460,5 +460,25 @@ TEST(LoaderMessages, WhatTheDatasetLacksIsNotRead) {
   EXPECT_FALSE(decode_wanted(encode_wanted(fine) + "x", info));
 }
 
+TEST(LoaderMessages, WhatIsExpectedArrivesUnlessItIsMalformed) {
+  const Expected sent{"u/c/0", true, 20, {{5, 9}, {0, ~std::uint64_t{0}}}};
+  const std::string bytes = encode_expected(sent);
+  const auto got = decode_expected(bytes);
+  ASSERT_TRUE(got);
+  EXPECT_EQ(got->name, sent.name);
+  EXPECT_TRUE(got->in_parts);
+  EXPECT_EQ(got->tail_bytes, 20U);
+  ASSERT_EQ(got->extents.size(), 2U);
+  EXPECT_EQ(got->extents[0].begin, 5U);
+  EXPECT_EQ(got->extents[1].end, ~std::uint64_t{0});
+  for (std::size_t cut = 0; cut < bytes.size(); ++cut) {
+    EXPECT_FALSE(decode_expected(bytes.substr(0, cut))) << cut;
+  }
+  EXPECT_FALSE(decode_expected(bytes + 'x'));
+  Expected many = sent;
+  many.extents.resize(expected_extents_max + 1);
+  EXPECT_FALSE(decode_expected(encode_expected(many)));
+}
+
 }  // namespace
 }  // namespace windsplat::data::loader
