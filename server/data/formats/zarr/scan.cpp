@@ -245,6 +245,7 @@ class StoreScan {
   // Looks at the files of chunks, and counts the absent ones; not of a store that is fetched, whose
   // chunks are fetched when they are read, or of one that says what it contains.
   void identify() {
+    expect_small();
     if (out_.levels && !out_.levels->contents.empty()) return;
     if (files_.location().fetched) {
       out_.file.notes.emplace_back(
@@ -274,6 +275,18 @@ class StoreScan {
       next -= here;
       tell_absent(array, here);
     }
+  }
+
+  // Coordinates and statistics, which are read next, one after the other.
+  void expect_small() {
+    const auto expect = [this](const Array& array) {
+      const bool is_small = array.metadata.shape.size() <= 2 && !array.line &&
+                            array.metadata.problem.empty() && !array.metadata.shard;
+      if (!is_small || file_count(array.metadata) != 1) return;
+      files_.expect({.name = array.path + file_key(array.metadata, 0)});
+    };
+    for (const Array& array : out_.arrays) expect(array);
+    for (const Array& array : out_.level_arrays) expect(array);
   }
 
   // zarr-python 3 leaves out chunks of which all values are the fill value.

@@ -1,5 +1,6 @@
 #include "server/data/formats/zarr/store.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -12,8 +13,11 @@ namespace windsplat::data::zarr {
 
 bool is_store(Files& files) {
   if (files.location().kind != Location::Kind::folder) return false;
-  return files.exists(".zgroup") || files.exists(".zmetadata") || files.exists(".zarray") ||
-         files.exists("zarr.json");
+  constexpr auto names =
+      std::to_array<const char*>({"zarr.json", ".zgroup", ".zmetadata", ".zarray"});
+  for (const char* const name : names) files.expect({.name = name});  // at the same time
+  return std::any_of(names.begin(), names.end(),
+                     [&](const char* name) { return files.exists(name); });
 }
 
 Result<std::unique_ptr<Store>> Store::open(std::shared_ptr<Files> files,
