@@ -65,6 +65,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(host_parts ${SYSTEM_PYTHON} tests/integration/host_parts.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(remote_stores ${SYSTEM_PYTHON} tests/integration/levels/remote_stores.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(addresses ${SYSTEM_PYTHON} tests/integration/addresses.py
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(values ${SYSTEM_PYTHON} tests/integration/values.py
