@@ -25,7 +25,7 @@ from inputs import read_netcdf, write_pressures, write_raw
 from served import taken_program
 
 PROGRAM = taken_program()
-SIDES = (70000, 131, 1)  # 9 units for each of two fields
+SIDES = (36000, 131, 1)  # 5 units for each of two fields
 
 
 def command(*arguments):
@@ -41,6 +41,17 @@ def files_of(folder):
 
 
 class Interrupted(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """The source of most tests and the store of a run that nothing interrupts, made once."""
+        kept = tempfile.TemporaryDirectory(prefix="windsplat-whole-")
+        cls.addClassCleanup(kept.cleanup)
+        folder = pathlib.Path(kept.name)
+        cls.source, _ = write_raw(folder, "long", SIDES, np.random.default_rng(3), 400)
+        cls.whole = folder / "whole.zarr"
+        done = run(cls.source, "-o", cls.whole, "--threads", 1)
+        assert done.returncode == 0, done.stderr
+
     def setUp(self):
         self.temporary = tempfile.TemporaryDirectory(prefix="windsplat-interrupted-")
         self.folder = pathlib.Path(self.temporary.name)
@@ -65,32 +76,28 @@ class Interrupted(unittest.TestCase):
         """False: it was complete before."""
         process = subprocess.Popen(command(*arguments, "-o", store), stderr=subprocess.DEVNULL)
         while process.poll() is None and self.lines(store) < units:
-            time.sleep(0.0005)
+            time.sleep(0.002)
         process.send_signal(how)
         return process.wait() != 0
 
     def test_a_run_that_is_killed_at_any_unit_is_continued_to_equal_bytes(self):
-        source, _ = write_raw(self.folder, "long", SIDES, np.random.default_rng(3), 400)
-        whole = self.folder / "whole.zarr"
-        self.ok(source, "-o", whole, "--threads", 1)
         store = self.folder / "parts.zarr"
         killed = 0
-        for units in range(0, 18, 2):
-            if not self.kill_after(units, signal.SIGKILL, store, source, "--threads",
+        for units in range(0, 10, 2):
+            if not self.kill_after(units, signal.SIGKILL, store, self.source, "--threads",
                                    1 + units // 2 % 3):
                 break
             killed += 1
             self.assertFalse(store.exists())
-        self.assertGreaterEqual(killed, 8)
-        done = self.ok(source, "-o", store, "--threads", 2, "-v")
-        kept = int(re.search(r"(\d+) of 18 units were there", done.stderr)[1])
-        self.assertGreaterEqual(kept, 16)
-        self.assert_same(whole, store)
+        self.assertGreaterEqual(killed, 4)
+        done = self.ok(self.source, "-o", store, "--threads", 2, "-v")
+        kept = int(re.search(r"(\d+) of 10 units were there", done.stderr)[1])
+        self.assertGreaterEqual(kept, 8)
+        self.assert_same(self.whole, store)
 
     def test_an_interrupt_keeps_what_is_done(self):
-        source, _ = write_raw(self.folder, "long", SIDES, np.random.default_rng(3), 400)
         store = self.folder / "out.zarr"
-        process = subprocess.Popen(command(source, "-o", store, "--threads", 1),
+        process = subprocess.Popen(command(self.source, "-o", store, "--threads", 1),
                                    stderr=subprocess.PIPE, text=True)
         while process.poll() is None and self.lines(store) < 3:
             time.sleep(0.001)
@@ -117,34 +124,30 @@ class Interrupted(unittest.TestCase):
         self.ok(source, "-o", store, "--restart", "--field", "q")
 
     def test_a_journal_that_was_cut_off_is_continued(self):
-        source, _ = write_raw(self.folder, "long", SIDES, np.random.default_rng(3), 400)
-        whole, store = self.folder / "whole.zarr", self.folder / "out.zarr"
-        self.ok(source, "-o", whole)
-        self.assertTrue(self.kill_after(6, signal.SIGKILL, store, source, "--threads", 1))
+        store = self.folder / "out.zarr"
+        self.assertTrue(self.kill_after(6, signal.SIGKILL, store, self.source, "--threads", 1))
         journal = self.folder / "out.zarr.part/.journal"
         text = journal.read_bytes()
         journal.write_bytes(text[:-30])
         files = sorted((self.folder / "out.zarr.part/0").rglob("c/0/*/*/*"))
         files[0].write_bytes(files[0].read_bytes()[:-1])  # its unit is made again
-        self.ok(source, "-o", store)
-        self.assert_same(whole, store)
+        self.ok(self.source, "-o", store)
+        self.assert_same(self.whole, store)
 
     def test_a_full_disk_ends_it_and_more_space_continues_it(self):
-        source, _ = write_raw(self.folder, "long", SIDES, np.random.default_rng(3), 400)
-        whole, store = self.folder / "whole.zarr", self.folder / "out.zarr"
-        self.ok(source, "-o", whole)
+        store = self.folder / "out.zarr"
         # As on a disk without room: a file of this size cannot be written.
-        full = run(source, "-o", store, preexec_fn=lambda: resource.setrlimit(
+        full = run(self.source, "-o", store, preexec_fn=lambda: resource.setrlimit(
             resource.RLIMIT_FSIZE, (1 << 20, 1 << 20)))
         self.assertEqual(full.returncode, 1, full.stderr)
         self.assertIn("too large", full.stderr)
         self.assertIn("the same command continues it", full.stderr)
         self.assertFalse(store.exists())
-        self.ok(source, "-o", store)
-        self.assert_same(whole, store)
+        self.ok(self.source, "-o", store)
+        self.assert_same(self.whole, store)
 
     def test_memory_of_all_processes_stays_within_the_limit(self):
-        sides = (1024, 1024, 320)  # five times the limit
+        sides = (1024, 1024, 160)  # two and a half times the limit
         document = {"windsplat": "raw", "file": "large.raw", "dims": dict(zip("xyz", sides)),
                     "type": "float32", "endian": "little", "fields": [{"name": "q"}]}
         source = self.folder / "large.json"
@@ -188,8 +191,7 @@ class Interrupted(unittest.TestCase):
         self.ok(source, *options, "--memory-limit", enough[1])
 
     def test_verify_finds_one_flipped_bit_anywhere(self):
-        source = write_pressures(self.folder / "gcm.nc", (20, 150, 170),
-                                 np.random.default_rng(4))
+        source = write_pressures(self.folder / "gcm.nc", (12, 150, 170), np.random.default_rng(4))
         store = self.folder / "gcm.zarr"
         self.ok(source, "-o", store, "--verify")
         self.assertIn("is sound", self.ok("--verify", store).stderr)

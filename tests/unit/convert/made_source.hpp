@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,7 +55,12 @@ class MadeSource : public data::Source {
   }
   Result<data::Volume> read_part(std::size_t field, std::size_t step,
                                  const data::StoredPart& part) override {
-    return cut(whole(info_, field, step), part.box);
+    // Made once for all pencils of a step: making it takes longer than they do.
+    if (kept_of_ != std::pair{field, step}) {
+      kept_ = whole(info_, field, step);
+      kept_of_ = {field, step};
+    }
+    return cut(kept_, part.box);
   }
 
   // Noise, a tenth of it masked, and a corner of a few bricks.
@@ -80,6 +86,8 @@ class MadeSource : public data::Source {
 
  private:
   data::DatasetInfo info_;
+  data::Volume kept_;
+  std::optional<std::pair<std::size_t, std::size_t>> kept_of_;  // field and step
 };
 
 }  // namespace windsplat::test
