@@ -150,11 +150,14 @@ std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset
     }
   };
   const Shown shown(completed, dataset);
-  const std::array<int, 3>& coarsest = dataset.info().stored->levels.back();
-  const auto base = shown.at(coarsest);
-  if (wanted.halvings != coarsest && may_merge(completed.view()) && is_base(base, dataset)) {
-    add(base, std::nullopt);
+  const auto& levels = dataset.info().stored->levels;
+  std::vector<ShownField> base;
+  for (std::size_t n = levels.size(); n > 0 && may_merge(completed.view()); --n) {
+    auto finer = shown.at(levels[n - 1]);
+    if (levels[n - 1] == wanted.halvings || !is_base(finer, dataset)) break;
+    base = std::move(finer);
   }
+  add(base, std::nullopt);
   add(shown.at(wanted.halvings), wanted.box);
   return out;
 }

@@ -26,9 +26,9 @@ struct Substitute {
 std::optional<Substitute> stand_in_for(const CompletedView& completed, const DrawnPart& wanted,
                                        const data::Dataset& dataset);
 
-// What is loaded while a view moves, in this order: the coarsest level, which always stands in if
-// it takes little of the memory limit, and what is drawn once it is resident. Empty: nothing stands
-// in for it.
+// What is loaded while a view moves, in this order: the finest whole level that takes little of the
+// memory limit, which always stands in, and what is drawn once it is resident. Empty: nothing
+// stands in for it.
 std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset& dataset);
 
 }  // namespace windsplat::scene
