@@ -73,6 +73,9 @@ windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:wi
 windsplat_smoke(load bench_load --program=$<TARGET_FILE:windsplat> --dims=32x16x8 --rounds=1)
 windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FILE:windsplat>
   --dims=32x16x8 --steps=6 --size=64x48 --memory-limit=512M)
+windsplat_smoke(large_store python3 ${bench_dir}/files/large_store.py
+  --program=$<TARGET_FILE:windsplat> --data=tornado:96x96x64 --memory-limit=192M --size=64x48
+  --seconds=1 --disk-mib=8)
 windsplat_smoke(memory_limit python3 ${bench_dir}/playback.py
   --program=$<TARGET_FILE:windsplat> --sessions=8 --apart --steps=12 --seconds=8 --size=160x120
   --memory-limit=192M --check-memory)
