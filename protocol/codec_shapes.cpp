@@ -194,7 +194,8 @@ Json levels_json(const std::vector<LevelDescription>& levels) {
     Json one{{"dims", {{"x", level.dims[0]}, {"y", level.dims[1]}, {"z", level.dims[2]}}},
              {"halvings", level.halvings},
              {"bricks", level.bricks},
-             {"bytes", level.bytes}};
+             {"bytes", level.bytes},
+             {"residentBytes", level.resident_bytes}};
     if (level.stored_bytes) one["storedBytes"] = *level.stored_bytes;
     out.push_back(std::move(one));
   }

@@ -107,6 +107,7 @@ struct LevelDescription {
   std::uint64_t bricks = 0;       // of each array at a step
   std::uint64_t bytes = 0;        // of the fields that have the level, at a step, in memory
   std::optional<std::uint64_t> stored_bytes;  // of its files, at all steps
+  std::uint64_t resident_bytes = 0;           // in memory now, of all fields at all steps
 };
 struct DatasetDescription {
   std::string id;

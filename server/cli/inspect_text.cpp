@@ -249,7 +249,8 @@ std::string levels_text(const protocol::DatasetDescription& dataset) {
     const protocol::LevelDescription& level = dataset.levels[n];
     std::string dims;
     for (const int dim : level.dims) dims += (dims.empty() ? "" : " x ") + std::to_string(dim);
-    rows.push_back({std::to_string(n), dims + " samples", std::to_string(level.bricks) + " bricks",
+    rows.push_back({std::to_string(n), dims + " samples",
+                    std::to_string(level.bricks) + (level.bricks == 1 ? " brick" : " bricks"),
                     byte_count(level.bytes) + " in memory at a step",
                     level.stored_bytes ? byte_count(*level.stored_bytes) + " on disk" : ""});
   }

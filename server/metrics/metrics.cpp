@@ -88,6 +88,19 @@ void add_budget(Families& out, const data::BudgetCounts& budget) {
   add_labelled(out, "windsplat_volume_loads_total",
                "Volumes read from their files or made by a sample.", "result",
                {{"ok", budget.reads - budget.reads_failed}, {"failed", budget.reads_failed}});
+  add_gauge(out, "windsplat_parts_resident_bytes", "Bytes of parts of volumes in memory.",
+            static_cast<double>(budget.part_bytes));
+}
+
+// Of stores with levels.
+void add_bricks(Families& out, const data::BrickCounts& bricks) {
+  add_labelled(out, "windsplat_bricks_total",
+               "Bricks wanted of stores, by where their samples were.", "from",
+               {{"resident", bricks.resident}, {"store", bricks.read}});
+  add_counter(out, "windsplat_brick_bytes_read_total",
+              "Bytes of samples read of bricks, as they are in memory.", bricks.bytes_read);
+  add_gauge(out, "windsplat_bricks_waiting", "Bricks being read or waiting for the reader.",
+            static_cast<double>(bricks.waiting));
 }
 
 double resident_process_bytes() {
@@ -202,6 +215,9 @@ struct Metrics::State {
   Gauge& encoders = add.gauge("windsplat_video_encoders", "Encoders of H.264 in use.");
   Counter& video_failures = add.counter("windsplat_video_failures_total",
                                         "Frames sent as JPEG because the video encoder failed.");
+  Counter& stand_ins =
+      add.counter("windsplat_frames_stand_in_total",
+                  "Moving frames sent with coarser data than wanted, which were not in memory.");
   Counter& dropped = add.counter("windsplat_frames_dropped_total",
                                  "Frames drawn but not sent because the view had changed.");
   Counter& cancelled =
@@ -232,8 +248,9 @@ void Metrics::stage_took(Stage stage, std::int64_t us) {
   state_->stages[static_cast<std::size_t>(stage)]->Observe(static_cast<double>(us) / us_per_s);
 }
 
-void Metrics::frame_sent(session::Tier tier, const protocol::FrameHeader& header) {
+void Metrics::frame_sent(session::Tier tier, const protocol::FrameHeader& header, bool stands_in) {
   state_->frames[static_cast<std::size_t>(tier)]->Increment();
+  if (stands_in) state_->stand_ins.Increment();
   if (header.codec == protocol::Codec::h264) {
     const bool key = (header.flags & protocol::flag_key) != 0;
     state_->video[key ? 1 : 0]->Increment();
@@ -299,6 +316,7 @@ void Metrics::background_done(bool cancelled) { state_->studies[cancelled ? 1 : 
 std::string Metrics::text(const data::BudgetCounts& budget) const {
   Families families = state_->registry.Collect();
   add_budget(families, budget);
+  add_bricks(families, budget.bricks);
   add_process(families);
   std::ostringstream out;
   prometheus::TextSerializer().Serialize(out, families);

@@ -31,8 +31,8 @@ class Metrics {
   // Responses are counted by these routes, others as "other". Call before events arrive.
   void count_routes(const std::vector<const char*>& routes);
   void stage_took(Stage stage, std::int64_t us);
-  // A frame written completely to the socket.
-  void frame_sent(session::Tier tier, const protocol::FrameHeader& header);
+  // A frame written completely to the socket. stands_in: see session::SendFrame.
+  void frame_sent(session::Tier tier, const protocol::FrameHeader& header, bool stands_in);
   void video_encoders(int more);  // negative: fewer
   void video_failed();            // the encoder: JPEG is sent
   void frames_dropped(std::uint64_t count);

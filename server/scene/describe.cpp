@@ -151,21 +151,20 @@ void add_bounded(const std::vector<std::string>& unread, std::vector<std::string
 std::vector<protocol::LevelDescription> describe_levels(const data::DatasetInfo& info) {
   std::vector<protocol::LevelDescription> out;
   if (!info.stored || info.stored->levels.size() < 2) return out;
-  std::array<int, 3> brick{1, 1, 1};
-  for (const data::FieldInfo& field : info.fields) {
-    if (field.is_read_by_boxes()) brick = field.box_chunk;
+  std::size_t of_bricks = 0;  // a field that has them
+  for (std::size_t f = 0; f < info.fields.size(); ++f) {
+    if (info.fields[f].is_read_by_boxes()) of_bricks = f;
   }
   for (std::size_t n = 0; n < info.stored->levels.size(); ++n) {
     protocol::LevelDescription level;
     level.halvings = info.stored->levels[n];
-    level.bricks = 1;
     std::uint64_t samples = 1;
     for (std::size_t a = 0; a < 3; ++a) {
       level.dims.at(a) = data::halved(info.grid.dims().at(a), level.halvings.at(a));
       samples *= static_cast<std::uint64_t>(level.dims.at(a));
-      level.bricks *=
-          static_cast<std::uint64_t>((level.dims.at(a) - 1) / std::max(1, brick.at(a)) + 1);
     }
+    const data::StoredPart whole{data::whole_box(level.dims), n};
+    level.bricks = std::max<std::uint64_t>(1, data::bricks_of(info, of_bricks, whole));
     for (std::size_t f = 0; f < info.stored->fields.size(); ++f) {
       if (!info.stored->fields[f].has_levels) continue;  // as components that are shown alone
       const data::FieldInfo& field = info.fields[f];
@@ -230,6 +229,14 @@ void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription&
       field.range =
           protocol::Range{static_cast<double>(seen->range[0]), static_cast<double>(seen->range[1])};
     }
+  }
+}
+
+void add_resident_bytes(const data::Dataset& dataset, protocol::DatasetDescription& description) {
+  description.resident_bytes = dataset.resident_bytes();
+  const std::vector<std::uint64_t> bytes = dataset.resident_bytes_of_levels();
+  for (std::size_t n = 0; n < description.levels.size(); ++n) {
+    description.levels[n].resident_bytes = bytes.at(n);
   }
 }
 
@@ -302,14 +309,15 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;
   out.time_calendar = info.time_calendar;
-  out.resident_bytes = dataset.resident_bytes();
   out.bytes_when_resident = components * info.grid.samples() * sizeof(float) * info.steps.size();
   out.default_view.dataset = info.id;
-  if (ranges == RangesOf::none) return out;
-  if (auto done = add_default_view(dataset, !unread.empty(), ranges, out); !done) {
-    return done.error();
+  if (ranges != RangesOf::none) {
+    if (auto done = add_default_view(dataset, !unread.empty(), ranges, out); !done) {
+      return done.error();
+    }
   }
   if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
+  add_resident_bytes(dataset, out);
   return out;
 }
 

@@ -24,6 +24,9 @@ enum class RangesOf {
 // Adds ranges and masked counts of the first step for the fields loaded meanwhile.
 void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription& description);
 
+// Sets what is in memory now, altogether and of each level.
+void add_resident_bytes(const data::Dataset& dataset, protocol::DatasetDescription& description);
+
 // Description for lists: fields with their kinds and the number of steps; no axes, steps or ranges.
 protocol::DatasetDescription describe_briefly(const data::Dataset& dataset);
 

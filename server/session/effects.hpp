@@ -61,6 +61,7 @@ struct SendFrame {
   protocol::FrameHeader header;
   Payload payload;
   Tier tier = Tier::moving;
+  bool stands_in = false;  // coarser data than wanted are drawn, until those are in memory
 };
 // The steps whose fields a view will probably need soon, most urgent first; replaces the previous
 // request. None: withdraws it. Not answered.

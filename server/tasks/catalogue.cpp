@@ -38,7 +38,7 @@ std::optional<protocol::DatasetDescription> Catalogue::known(const data::Dataset
 protocol::DatasetDescription Catalogue::refreshed(const data::Dataset& dataset,
                                                   protocol::DatasetDescription description) const {
   scene::add_seen_ranges(dataset, description);
-  description.resident_bytes = dataset.resident_bytes();
+  scene::add_resident_bytes(dataset, description);
   if (std::string note = store_->note(description.id); !note.empty()) {
     description.notes.push_back(std::move(note));
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <list>
 #include <map>
@@ -63,7 +64,7 @@ protocol::JobDescription describe(const Job& job) {
   out.progress = job.progress;
   if (job.stage == Stage::running && out.progress >= progress_for_eta) {
     const std::chrono::duration<double, std::milli> taken = Clock::now() - job.since;
-    out.eta_ms = taken.count() * (1 - out.progress) / out.progress;
+    out.eta_ms = std::ceil(taken.count() * (1 - out.progress) / out.progress);
   }
   out.result = job.result;
   if (job.error) out.problem = protocol::problem_from(*job.error);

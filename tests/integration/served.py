@@ -90,6 +90,12 @@ class Daemon:
     def post(self, path, document):
         return self.ask("POST", path, json.dumps(document), {"Content-Type": "application/json"})
 
+    def metric(self, series):
+        """The value of a series, by its name with labels."""
+        lines = self.get("/metrics").body.decode().splitlines()
+        found, = (line for line in lines if line.startswith(f"{series} "))
+        return int(float(found.rpartition(" ")[2]))
+
     def finished(self, job, seconds=30):
         """The state of a job, by its location, once it has ended."""
         end = time.monotonic() + seconds

@@ -60,7 +60,7 @@ DatasetDescription climate() {
   dataset.left_out = {{"ps", "two-dimensional"}};
   dataset.notes = {"winds were turned from the grid's axes to east and north"};
   dataset.choices = {{"number", 3, {"0", "1", "2"}, "1"}};
-  dataset.levels = {{{2, 1, 3}, {0, 0, 0}, 1, 72, 6'000'000'000},
+  dataset.levels = {{{2, 1, 3}, {0, 0, 0}, 1, 72, 6'000'000'000, 5'000'000'001},
                     {{1, 1, 2}, {1, 0, 1}, 1, 24, std::nullopt}};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
   dataset.time_units = "hours since 2001-01-01";
@@ -248,8 +248,8 @@ TEST(Shapes, DatasetInFull) {
             Json::parse(R"([{"name":"number","length":3,"values":["0","1","2"],"chosen":"1"}])"));
   EXPECT_EQ(dataset["levels"], Json::parse(R"([
       {"dims":{"x":2,"y":1,"z":3},"halvings":[0,0,0],"bricks":1,"bytes":72,
-       "storedBytes":6000000000},
-      {"dims":{"x":1,"y":1,"z":2},"halvings":[1,0,1],"bricks":1,"bytes":24}])"));
+       "storedBytes":6000000000,"residentBytes":5000000001},
+      {"dims":{"x":1,"y":1,"z":2},"halvings":[1,0,1],"bricks":1,"bytes":24,"residentBytes":0}])"));
   EXPECT_EQ(dataset["timeUnits"], "hours since 2001-01-01");
   EXPECT_EQ(dataset["timeCalendar"], "noleap");
   EXPECT_EQ(dataset["residentBytes"], 48);

@@ -56,12 +56,13 @@ test("tells the levels of a store", () => {
       bricks: 81,
       bytes: 9,
       storedBytes: 4e8,
+      residentBytes: 2_300_000,
     },
-    { dims: { x: 260, y: 70, z: 67 }, halvings: [1, 1, 1], bricks: 1, bytes: 9 },
+    { dims: { x: 260, y: 70, z: 67 }, halvings: [1, 1, 1], bricks: 1, bytes: 9, residentBytes: 0 },
   ];
   const sections = aboutSections({ ...dataset, levels } as unknown as Dataset);
   assert.deepEqual(sections.find(({ title }) => title === "Levels of detail")?.rows, [
-    ["0", "520 x 140 x 133 samples in 81 bricks, 400.0 MB on disk"],
+    ["0", "520 x 140 x 133 samples in 81 bricks, 400.0 MB on disk, 2.3 MB in memory"],
     ["1", "260 x 70 x 67 samples in one brick"],
   ]);
 });

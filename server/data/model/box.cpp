@@ -156,6 +156,17 @@ double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
   return share;
 }
 
+std::uint64_t chunks_of(const Box& box, const FieldInfo& field) {
+  std::uint64_t chunks = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int length = field.box_chunk.at(a);
+    const int first = box.first.at(a) + length - field.box_chunk_first.at(a);  // not negative
+    const int last = first + box.count.at(a) - 1;
+    chunks *= static_cast<std::uint64_t>(last / length - first / length + 1);
+  }
+  return chunks;
+}
+
 std::vector<Box> pieces_of(const Box& box, int layer_stride, const FieldInfo& field,
                            std::size_t values_max) {
   std::array<int, 3> length = field.box_chunk;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,6 +47,8 @@ int layers_apart(const Box& box, int layer_stride, const FieldInfo& field,
 // The share of a step that is decoded to read every `layer_stride`-th layer of a box.
 double decoded_share(const Box& box, int layer_stride, const FieldInfo& field,
                      const std::array<int, 3>& dims);
+// Chunks that have samples of a box.
+std::uint64_t chunks_of(const Box& box, const FieldInfo& field);
 // Boxes that hold every `layer_stride`-th layer of a box, in ascending order: of whole chunks, so
 // that none is decoded twice, and of at most `values_max` values of all components, or a chunk.
 std::vector<Box> pieces_of(const Box& box, int layer_stride, const FieldInfo& field,

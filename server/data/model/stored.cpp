@@ -160,6 +160,20 @@ bool is_stored(const DatasetInfo& info, std::size_t field, const StoredPart& par
   return dims && is_within(part.box, *dims);
 }
 
+std::optional<std::size_t> level_of(const DatasetInfo& info, const std::array<int, 3>& halvings) {
+  if (info.stored == nullptr) return std::nullopt;
+  const auto& levels = info.stored->levels;
+  const auto found = std::find(levels.begin(), levels.end(), halvings);
+  if (found == levels.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - levels.begin());
+}
+
+std::uint64_t bricks_of(const DatasetInfo& info, std::size_t field, const StoredPart& part) {
+  const FieldInfo& of = info.fields.at(field);
+  const bool has_bricks = info.stored != nullptr && of.is_read_by_boxes();
+  return has_bricks ? chunks_of(part.box, of) : 0;
+}
+
 int components_of(const FieldInfo& field, StoredAs as) {
   return as == StoredAs::two_values ? TwoValues::components
                                     : static_cast<int>(field.components.size());
@@ -167,12 +181,10 @@ int components_of(const FieldInfo& field, StoredAs as) {
 
 std::optional<StoredPart> stored_level(const DatasetInfo& info, std::size_t field,
                                        const Coarsening& how) {
-  if (info.stored == nullptr || how.halvings == full) return std::nullopt;
-  const auto& levels = info.stored->levels;
-  const auto found = std::find(levels.begin(), levels.end(), how.halvings);
-  if (found == levels.end()) return std::nullopt;
+  const auto level = level_of(info, how.halvings);
+  if (!level || *level == 0) return std::nullopt;
   StoredPart part;
-  part.level = static_cast<std::size_t>(found - levels.begin());
+  part.level = *level;
   const bool drawn = how.reduction == Reduction::drawn;
   part.as = drawn ? StoredAs::drawn : StoredAs::two_values;
   const auto dims = stored_dims(info, field, part.level, part.as);

@@ -64,6 +64,11 @@ std::optional<std::array<int, 3>> stored_dims(const DatasetInfo& info, std::size
                                               std::size_t level, StoredAs as);
 // Whether the field is read by boxes (level 0) or its level is stored as that, and has the box.
 bool is_stored(const DatasetInfo& info, std::size_t field, const StoredPart& part);
+// The number of the level with these halvings; nullopt: there is none.
+std::optional<std::size_t> level_of(const DatasetInfo& info, const std::array<int, 3>& halvings);
+// The bricks that a part has samples of: chunks of the store, counted once for all components. Zero
+// of a dataset without stored levels, and of a field that is not read by boxes.
+std::uint64_t bricks_of(const DatasetInfo& info, std::size_t field, const StoredPart& part);
 // Components of the volume of a part.
 int components_of(const FieldInfo& field, StoredAs as);
 

@@ -177,6 +177,10 @@ BudgetCounts Budget::counts() const {
   BudgetCounts out = counts_;
   out.bytes_max = bytes_max_;
   out.bytes = used_ - released();
+  for (const ResidentKey& key : recent_) {
+    out.part_bytes += is_box(key) ? entries_.at(key)->bytes : 0;
+  }
+  out.bricks = bricks_.counts();
   return out;
 }
 

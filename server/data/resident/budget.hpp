@@ -22,6 +22,7 @@
 
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
+#include "server/data/resident/brick_counts.hpp"
 
 namespace windsplat::data {
 
@@ -50,6 +51,8 @@ struct BudgetCounts {
   std::uint64_t refusals = 0;   // loads that failed for lack of memory
   std::uint64_t reads = 0;      // volumes read from a source, and how many of them were prefetched
   std::uint64_t reads_failed = 0;
+  std::uint64_t part_bytes = 0;  // of resident boxes of fields
+  BrickCounts bricks;
 };
 
 // The name of the limit in messages.
@@ -93,11 +96,15 @@ class Budget {
   void request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys);
 
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t owner) const;
+  // The same by level, as variants begin (level_variant); those with another beginning are of none.
+  [[nodiscard]] std::vector<std::uint64_t> bytes_of_levels(std::uint64_t owner,
+                                                           std::size_t levels) const;
   // Drops the unreferenced volumes of a dataset.
   void evict(std::uint64_t owner);
   // Drops all volumes of a removed dataset; those referenced count until released.
   void forget(std::uint64_t owner);
   void count_read(bool ok);
+  [[nodiscard]] BrickMeter& bricks() { return bricks_; }
   // Ends all waits for room: later calls return resident volumes or an error.
   void end();
   [[nodiscard]] BudgetCounts counts() const;
@@ -188,6 +195,7 @@ class Budget {
   } turn_;
   bool ended_ = false;
   BudgetCounts counts_;
+  BrickMeter bricks_;  // not guarded
 };
 
 // Memory other than volumes that counts towards the limit during its lifetime. One thread at a
@@ -231,5 +239,8 @@ inline constexpr const char* packed_variant = "packed16";
 // their number does not make the search for room slow.
 inline constexpr const char* part_variant = "box ";
 inline constexpr std::size_t parts_kept_max = 256;
+// What follows in the variant of what is of a level, after that of a box: this and its number.
+// Without it, the volume, its packed form and boxes are of level 0.
+std::string level_variant(std::size_t level);
 
 }  // namespace windsplat::data

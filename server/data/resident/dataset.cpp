@@ -79,12 +79,17 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
   if (!index) return index.error();
   if (minus_) return difference(field, *index, step);
   const ResidentKey key{state_->owner, *index, step, ""};
+  const StoredPart whole{whole_box(state_->info.grid.dims())};
   if (manner_ == Manner::resident_only) {
-    const Resident there = state_->budget->find_now(key);
-    return there ? as_volume(there) : state_->not_resident(*index, step);
+    return state_->had(state_->budget->find_now(key), *index, step, whole);
   }
-  return as_volume(get(key, values_of(state_->info, *index) * sizeof(float),
-                       [&] { return state_->load(*index, step, urgency()); }));
+  bool was_there = true;
+  auto kept = get(key, values_of(state_->info, *index) * sizeof(float), [&] {
+    was_there = false;
+    return state_->load(*index, step, urgency());
+  });
+  if (kept && was_there) state_->budget->bricks().had(bricks_of(state_->info, *index, whole));
+  return as_volume(kept);
 }
 
 Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
@@ -95,8 +100,9 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
 
 Derivation Dataset::reduction(const std::string& field, const Coarsening& how) const {
   if (how.halvings == std::array{0, 0, 0}) return {};
-  return {digest_of(data::key_of(how)), level_bytes(field, how),
-          [state = state_, how](const Volume& fine) {
+  const auto level = level_of(state_->info, how.halvings);
+  return {(level ? level_variant(*level) : "") + digest_of(data::key_of(how)),
+          level_bytes(field, how), [state = state_, how](const Volume& fine) {
             state->add(&Counts::levels);
             return coarsen(fine, how);
           }};
@@ -117,7 +123,7 @@ std::optional<Derivation> Dataset::stored_reduction(const std::string& field,
   const auto middles = stored_middles(info, *index, how.stride);
   if (!middles) return std::nullopt;
   Derivation from;
-  from.variant = "strided " + std::to_string(how.stride);
+  from.variant = level_variant(middles->level) + "strided";
   from.bytes = bytes_beside_level(field, how);
   from.stored = middles;
   out.from = std::make_shared<const Derivation>(std::move(from));
@@ -178,10 +184,12 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   if (!index) return index.error();
   const ResidentKey key{state_->owner, *index, step, variant_of(how.variant, step)};
   if (manner_ == Manner::resident_only) {
-    const Resident there = state_->budget->find_now(key);
-    return there ? as_volume(there) : state_->not_resident(*index, step);
+    return state_->had(state_->budget->find_now(key), *index, step, how.stored);
   }
   if (const auto there = state_->budget->find(key)) {
+    if (*there && how.stored) {
+      state_->budget->bricks().had(bricks_of(state_->info, *index, *how.stored));
+    }
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
@@ -334,6 +342,11 @@ Dataset::Counts Dataset::counts() const {
 
 std::uint64_t Dataset::resident_bytes() const {
   return state_->budget->bytes_of(state_->owner) + state_->charged.bytes();
+}
+
+std::vector<std::uint64_t> Dataset::resident_bytes_of_levels() const {
+  const auto& stored = state_->info.stored;
+  return state_->budget->bytes_of_levels(state_->owner, stored ? stored->levels.size() : 0);
 }
 
 std::optional<Dataset::Loading> Dataset::loading() const {

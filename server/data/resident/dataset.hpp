@@ -206,6 +206,9 @@ class Dataset {
   };
   [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::uint64_t resident_bytes() const;
+  // The same of each stored level, full detail first: volumes and boxes of the fields, at all
+  // steps. What is computed beyond that, as differences and regions, is of no level.
+  [[nodiscard]] std::vector<std::uint64_t> resident_bytes_of_levels() const;
   [[nodiscard]] std::uint64_t loads() const { return counts().loads; }
   [[nodiscard]] std::uint64_t levels() const { return counts().levels; }
 

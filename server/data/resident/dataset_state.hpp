@@ -93,9 +93,18 @@ struct Dataset::State {
     return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
   }
 
-  [[nodiscard]] Error not_resident(std::size_t field, std::size_t step) const {
-    return make_error(ErrorKind::not_resident, in_quotes(info.fields[field].name) + " at step " +
-                                                   std::to_string(step) + " is not in memory yet");
+  // What is in memory of a field at a step, and counted if it is stored as `part`. Errors:
+  // not_resident.
+  [[nodiscard]] Result<std::shared_ptr<const Volume>> had(
+      const Resident& there, std::size_t field, std::size_t step,
+      const std::optional<StoredPart>& part = std::nullopt) const {
+    if (!there) {
+      return make_error(ErrorKind::not_resident, in_quotes(info.fields[field].name) + " at step " +
+                                                     std::to_string(step) +
+                                                     " is not in memory yet");
+    }
+    if (part) budget->bricks().had(bricks_of(info, field, *part));
+    return std::static_pointer_cast<const Volume>(there);
   }
 
   // Reads the volume from its source, or unpacks it.
@@ -103,6 +112,7 @@ struct Dataset::State {
     const ResidentKey twin{owner, field, step, packed_variant};
     if (const Resident packed = budget->find_now(twin)) {
       add(&Counts::unpacked);
+      budget->bricks().had(bricks_of(info, field, {whole_box(info.grid.dims())}));
       return guarded(info.fields[field], [&]() -> Result<Volume> {
         return unpack(*std::static_pointer_cast<const PackedVolume>(packed));
       });
@@ -119,11 +129,15 @@ struct Dataset::State {
   // part null: all samples.
   Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency,
                         const StoredPart* part) {
+    const std::uint64_t bricks =
+        bricks_of(info, field, part ? *part : StoredPart{whole_box(info.grid.dims())});
+    budget->bricks().wait_for(bricks);
     turnstile.enter(urgency);
     {
       const std::lock_guard lock(mutex);
       if (ended) {
         turnstile.leave();
+        budget->bricks().end_wait(bricks, 0);
         return why_cancelled();
       }
       ++counts.loads;
@@ -154,6 +168,9 @@ struct Dataset::State {
       }
     }
     turnstile.leave();
+    const bool has_bricks = volume && bricks > 0;
+    const auto bytes = has_bricks ? std::static_pointer_cast<const Volume>(*volume)->bytes() : 0;
+    budget->bricks().end_wait(bricks, bytes);
     budget->count_read(volume.has_value());
     return volume;
   }

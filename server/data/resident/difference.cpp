@@ -69,8 +69,7 @@ Result<std::shared_ptr<const Volume>> Dataset::difference(const std::string& fie
                                                           std::size_t index, std::size_t step) {
   const ResidentKey key{state_->owner, index, step, variant_of("", step)};
   if (manner_ == Manner::resident_only) {
-    const Resident there = state_->budget->find_now(key);
-    return there ? as_volume(there) : state_->not_resident(index, step);
+    return state_->had(state_->budget->find_now(key), index, step);
   }
   if (const auto there = state_->budget->find(key)) {
     if (*there && own_) own_->insert((*there)->get());

@@ -1,5 +1,6 @@
 // Boxes of fields: when they are read without the rest of a step, and their keys.
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "server/data/derived/difference.hpp"
@@ -105,20 +106,23 @@ Result<std::shared_ptr<const Volume>> Dataset::part(const std::string& field, st
   }
   const ResidentKey key{state_->owner, *index, step,
                         variant_of(part_variant + data::key_of(box), step)};
+  const StoredPart samples{box};
   if (manner_ == Manner::resident_only) {
-    const Resident there = state_->budget->find_now(key);
-    return there ? as_volume(there) : state_->not_resident(*index, step);
+    const auto stored = minus_ ? std::nullopt : std::optional(samples);
+    return state_->had(state_->budget->find_now(key), *index, step, stored);
   }
   const std::uint64_t bytes = bytes_of_box(about, box);
   if (!minus_) {
+    bool was_there = true;
     const auto made = get(key, bytes, [&]() -> Result<Resident> {
       const Resident whole = state_->budget->find_now({state_->owner, *index, step, ""});
-      const StoredPart samples{box};
+      was_there = whole != nullptr;
       if (!whole) return state_->read(*index, step, urgency(), &samples);
       return guarded(about, [&]() -> Result<Volume> {
         return cut(*std::static_pointer_cast<const Volume>(whole), box);
       });
     });
+    if (made && was_there) state_->budget->bricks().had(bricks_of(state_->info, *index, samples));
     if (made) return as_volume(made);
     return with_need_of_box(made.error(), info(), about, box, state_->charged.bytes(),
                             *state_->budget);

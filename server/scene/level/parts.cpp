@@ -211,8 +211,8 @@ data::Derivation read_of(const data::FieldInfo& field, const data::StoredPart& p
   data::Derivation out;
   out.variant = data::part_variant;
   if (part.level > 0) {
-    out.variant += "of level " + std::to_string(part.level) + ' ' +
-                   std::to_string(static_cast<int>(part.as)) + ' ';
+    out.variant +=
+        data::level_variant(part.level) + std::to_string(static_cast<int>(part.as)) + ' ';
   }
   out.variant += data::key_of(part.box);
   out.bytes = part.box.samples() * static_cast<std::uint64_t>(components_of(field, part.as)) *
@@ -311,7 +311,9 @@ std::optional<data::Derivation> part_of_field(const data::Dataset& dataset,
     middles->box.count[a] = (end - 1) / how.stride + 1 - middles->box.first[a];
   }
   data::Derivation out;
-  out.variant = data::part_variant + data::key_of(how) + ' ' + data::key_of(box);
+  out.variant = data::part_variant;
+  if (const auto level = level_of(info, how.halvings)) out.variant += data::level_variant(*level);
+  out.variant += data::key_of(how) + ' ' + data::key_of(box);
   out.bytes = box.samples() * about->components.size() * sizeof(float);
   out.from = std::make_shared<const data::Derivation>(read_of(*about, *middles));
   out.make = [of_box, dims = info.grid.dims()](const data::Volume& strided) {

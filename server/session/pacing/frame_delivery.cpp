@@ -106,6 +106,7 @@ void send_frame(SessionState& state, const Render& render, Drawn drawn, Micros n
                      !state.quality.needs_thinner_slabs(render, drawn, state.view);
   const bool blank = is_blank(drawn.info);
   const bool loaded = drawn.loaded;
+  const bool stands_in = drawn.info.detail && drawn.info.detail->missing_bytes > 0;
   // Do not refine twice if the error is unknown.
   const double otherwise = render.purpose == Purpose::refining ? 0 : 1;
   const double error = drawn.info.error_value.value_or(otherwise);
@@ -118,7 +119,7 @@ void send_frame(SessionState& state, const Render& render, Drawn drawn, Micros n
   if (still) state.send(protocol::ProgressMessage{render.still_id, "still", 1, 0.0});
   state.send(protocol::ChosenMessage{seq, std::move(drawn.info), std::move(drawn.view_json)});
   state.effects.emplace_back(
-      SendFrame{header, std::move(drawn.payload), tier_of(render.purpose, final)});
+      SendFrame{header, std::move(drawn.payload), tier_of(render.purpose, final), stands_in});
   if (still) return;
   count_played(state, render, loaded, now);
   after_frame(state, render, seq, error, final, blank);

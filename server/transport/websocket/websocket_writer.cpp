@@ -27,7 +27,7 @@ void WebSocketWriter::send(const protocol::ServerMessage& message) {
 
 void WebSocketWriter::queue_frame(session::SendFrame effect) {
   queue_.set({protocol::encode_frame_header(effect.header), std::move(effect.payload), effect.tier,
-              effect.header});
+              effect.header, effect.stands_in});
 }
 
 void WebSocketWriter::ping(std::uint32_t seq) {
@@ -81,7 +81,8 @@ void WebSocketWriter::on_written(bool is_text) {
     owner_.on_text_written();
   } else {
     metrics_.stage_took(metrics::Metrics::Stage::write, now_us() - written_since_);
-    metrics_.frame_sent(queue_.frame()->tier, queue_.frame()->facts);
+    const QueuedFrame& frame = *queue_.frame();
+    metrics_.frame_sent(frame.tier, frame.facts, frame.stands_in);
     queue_.pop_frame();
     events_.on_frame_written();
   }

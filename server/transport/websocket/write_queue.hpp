@@ -20,6 +20,7 @@ struct QueuedFrame {
   session::Payload payload;
   session::Tier tier;
   protocol::FrameHeader facts;
+  bool stands_in;
 
   [[nodiscard]] std::size_t bytes() const { return header.size() + payload->size(); }
 };

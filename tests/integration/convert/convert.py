@@ -213,6 +213,7 @@ class Convert(unittest.TestCase):
         text = subprocess.run([PROGRAM, "inspect", store.folder], check=True,
                               capture_output=True, text=True).stdout
         self.assertRegex(text, r"\nlevels\n  0  520 x 140 x 133 samples  81 bricks")
+        self.assertRegex(text, r" 1 brick +\d")
 
     def test_what_is_refused(self):
         source = write_pressures(self.folder / "gcm.nc", (3, 30, 40), self.rng)

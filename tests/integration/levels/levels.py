@@ -18,7 +18,7 @@ import numpy as np
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
 
 from served import Daemon, taken_program
-from stores import write_netcdf, write_store
+from stores import CHUNK, write_netcdf, write_store
 
 PROGRAM = taken_program()
 LIMIT = 192  # MiB, of which 68 are for data
@@ -270,6 +270,35 @@ class Levels(unittest.TestCase):
                     "camera": {"projection": "perspective", "fovY": angle,
                                "eye": [-0.4 + 0.01 * angle, -0.6, 0.2], "target": [0.1, 0.6, 0.1]}}
             self.assertTrue(self.detail(self.picture(self.tight, view)))
+
+    def test_resident_bytes_and_bricks_are_those_of_the_parts_drawn(self):
+        view = {**self.WHOLE_CLOUD, "dataset": "large_store",
+                "image": {"width": 160, "height": 120}}
+        store = pathlib.Path(self.folder.name) / "large_store.zarr"
+        with Daemon(PROGRAM, store, f"--memory-limit={LIMIT}M") as daemon:
+            def told():
+                dataset = daemon.get("/v1/datasets/large_store").json()
+                levels = [one["residentBytes"] for one in dataset["levels"]]
+                self.assertLessEqual(sum(levels), dataset["residentBytes"])
+                return np.array([*levels, *(daemon.metric(f"windsplat_{one}") for one in (
+                    'bricks_total{from="store"}', "brick_bytes_read_total", "bricks_waiting",
+                    "parts_resident_bytes", 'bricks_total{from="resident"}'))])
+            for x in (-0.5, 0, 0.5):
+                before = told()
+                view["camera"] = {"projection": "orthographic", "eye": [x, -2, 0],
+                                  "target": [x, 0, 0], "height": 0.05}
+                drawn = self.detail(self.picture(daemon, view))["drawn"]
+                self.assertEqual(drawn["halvings"], [0, 0, 0])
+                bricks = np.prod([(first + count - 1) // CHUNK - first // CHUNK + 1
+                                  for first, count in zip(drawn["first"], drawn["count"])])
+                samples = 4 * np.prod(drawn["count"])
+                first = told()
+                self.assertEqual(list((first - before)[:-1]),
+                                 [samples, 0, 0, 0, bricks, samples, 0, samples])
+                self.picture(daemon, view)
+                again = told() - first
+                self.assertEqual(list(again[:-1]), [0] * (len(again) - 1))
+                self.assertGreaterEqual(again[-1], bricks)
 
     def test_a_zoom_ends_with_every_sample(self):
         """From the whole to single voxels: levels never get coarser, and a pick is exact."""

@@ -37,6 +37,7 @@ class Session(WebSocket):
         super().__init__(Target("127.0.0.1", int(daemon.host.rpartition(":")[2])), 60, 0)
         self.rev = 0
         self.chosen = {}
+        self.stood_in = 0
 
     def patch(self, patch):
         self.rev += 1
@@ -54,6 +55,7 @@ class Session(WebSocket):
                 self.chosen[message["seq"]] = message
         seq, rev, _, flags = struct.unpack_from("<4I", payload, 8)
         self.say({"type": "ack", "seq": seq, "decodeMs": 1})
+        self.stood_in += "missingBytes" in self.chosen[seq].get("detail", {})
         length = struct.unpack_from("<H", payload, HEADER)[0]
         return rev, bool(flags & FINAL), self.chosen.pop(seq), payload[length:]
 
@@ -120,6 +122,8 @@ class StandIns(unittest.TestCase):
         session = Session(self.daemon)
         self.addCleanup(session.close)
         self.settled(session)
+        stood_in = self.daemon.metric("windsplat_frames_stand_in_total") - session.stood_in
+        self.assertEqual(self.daemon.metric("windsplat_bricks_waiting"), 0)
         self.assertGreater(self.signal_loaders(signal.SIGSTOP), 0)
         try:
             begin = time.monotonic()
@@ -136,10 +140,13 @@ class StandIns(unittest.TestCase):
                     time.sleep(0.4)  # the final frame waits, until the drag goes on
             self.assertLess(time.monotonic() - begin, 15)
             self.assertGreater(sum(n > 0 for n in missing), 20)
+            self.assertGreater(self.daemon.metric("windsplat_bricks_waiting"), 0)
         finally:
             self.signal_loaders(signal.SIGCONT)
         _, _, chosen, picture = session.frame_of(rev, final=True)
         self.assertNotIn("missingBytes", chosen["detail"])
+        self.assertEqual(self.daemon.metric("windsplat_frames_stand_in_total"),
+                         stood_in + session.stood_in)
         self.assertEqual(picture, self.picture({**VIEW, "camera": camera}))
 
     def test_what_is_missing_arrives_while_the_view_moves(self):

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -113,7 +114,9 @@ TEST(Jobs, ConcurrencyIsLimitedAndOthersWait) {
   for (const auto& job : jobs.list()) states.push_back(job.state);
   EXPECT_THAT(states, ElementsAre("running", "running", "queued", "queued", "queued"));
   EXPECT_EQ(jobs.find(ids[0])->progress, 0.5);
-  EXPECT_GE(jobs.find(ids[0])->eta_ms.value_or(-1), 0);
+  const double eta_ms = jobs.find(ids[0])->eta_ms.value_or(-1);
+  EXPECT_GE(eta_ms, 0);
+  EXPECT_EQ(eta_ms, std::floor(eta_ms)) << "whole milliseconds";
   EXPECT_FALSE(jobs.find(ids[4])->eta_ms);
   gate.open();
   for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -23,12 +24,16 @@ constexpr std::uint64_t scalar_bytes = 40 * 24 * 16 * sizeof(float);
 struct PartLog {
   int wholes = 0;
   std::vector<StoredPart> parts;
+  std::function<Result<void>()> before_part = [] { return Result<void>(); };
 };
+
+enum class With { levels, samples_alone };
 
 // A scalar `f` and a vector `v`, whose levels are those of coarsen().
 class SourceWithLevels final : public Source {
  public:
-  explicit SourceWithLevels(std::shared_ptr<PartLog> log) : log_(std::move(log)) {
+  explicit SourceWithLevels(std::shared_ptr<PartLog> log, With with = With::levels)
+      : log_(std::move(log)) {
     for (std::size_t a = 0; a < 3; ++a) {
       info_.grid.axes.at(a).name = "xyz"[a];
       for (int n = 0; n < dims.at(a); ++n) info_.grid.axes.at(a).coordinates.push_back(n);
@@ -39,9 +44,10 @@ class SourceWithLevels final : public Source {
     info_.fields[1].name = "v";
     info_.fields[1].kind = FieldKind::vector;
     info_.fields[1].components = {"a", "b"};
-    for (FieldInfo& field : info_.fields) field.box_chunk = {1, 1, 1};
+    for (FieldInfo& field : info_.fields) field.box_chunk = {16, 8, 16};
     info_.steps.resize(2);
     info_.id = "grid";
+    if (with == With::samples_alone) return;
     StoredLevels stored;
     stored.levels = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
     stored.fields.resize(2);
@@ -63,6 +69,7 @@ class SourceWithLevels final : public Source {
   Result<Volume> read_part(std::size_t field, std::size_t step, const StoredPart& part) override {
     if (auto fine = check_part(field, part); !fine) return fine.error();
     log_->parts.push_back(part);
+    if (auto done = log_->before_part(); !done) return done.error();
     if (part.level == 0) return cut(made(field, step), part.box);
     Coarsening how;
     how.halvings.fill(static_cast<int>(part.level));
@@ -71,7 +78,8 @@ class SourceWithLevels final : public Source {
     }
     if (part.as != StoredAs::two_values) how.reduction = Reduction::drawn;
     if (part.as == StoredAs::strided) how.stride = 1 << part.level;
-    return coarsen(made(field, step), how);
+    Volume level = coarsen(made(field, step), how);
+    return part.box == whole_box(level.dims) ? std::move(level) : cut(level, part.box);
   }
 
   static Volume made(std::size_t field, std::size_t step) {
@@ -104,9 +112,16 @@ Coarsening halved_by(int h, Reduction reduction, int stride = 1) {
 }
 
 struct StoredFixture {
-  explicit StoredFixture(std::uint64_t bytes = 100 * scalar_bytes)
-      : dataset(std::make_unique<SourceWithLevels>(log), "grid", bytes) {}
+  explicit StoredFixture(std::uint64_t bytes = 100 * scalar_bytes, With with = With::levels)
+      : budget(std::make_shared<Budget>(bytes)),
+        dataset(std::make_unique<SourceWithLevels>(log, with), "grid", budget) {}
+  // Bricks had, bricks read, bytes read.
+  [[nodiscard]] std::array<std::uint64_t, 3> bricks() const {
+    const BrickCounts counts = budget->counts().bricks;
+    return {counts.resident, counts.read, counts.bytes_read};
+  }
   std::shared_ptr<PartLog> log = std::make_shared<PartLog>();
+  std::shared_ptr<Budget> budget;
   Dataset dataset;
 };
 
@@ -187,6 +202,123 @@ TEST(Stored, RangesAreKnownBeforeAnythingIsRead) {
   EXPECT_EQ(seen->range, SourceWithLevels::made(0, 1).range);
   EXPECT_FALSE(f.dataset.seen("f", 2));
   EXPECT_EQ(f.log->wholes, 0);
+}
+
+// A box of a level as a scene asks for it.
+Derivation part_of(const StoredPart& part, std::uint64_t values) {
+  Derivation how;
+  how.variant = part_variant + (part.level > 0 ? level_variant(part.level) : "") +
+                std::to_string(static_cast<int>(part.as)) + ' ' + key_of(part.box);
+  how.bytes = part.box.samples() * values * sizeof(float);
+  how.stored = part;
+  return how;
+}
+
+TEST(Stored, ResidentBytesAreThoseOfEachLevel) {
+  using Bytes = std::vector<std::uint64_t>;
+  StoredFixture f;
+  EXPECT_EQ(f.dataset.resident_bytes_of_levels(), (Bytes{0, 0, 0}));
+  ASSERT_TRUE(f.dataset.volume("f", 0));
+  Bytes wanted{40 * 24 * 16 * 4, 0, 0};
+  EXPECT_EQ(f.dataset.resident_bytes_of_levels(), wanted);
+  ASSERT_TRUE(f.dataset.part("f", 1, {{8, 0, 0}, {16, 8, 4}}));
+  wanted[0] += 16 * 8 * 4 * 4;
+  ASSERT_TRUE(f.dataset.level("f", 1, halved_by(2, Reduction::two_values)));
+  wanted[2] += 10 * 6 * 4 * 4 * 4;
+  ASSERT_TRUE(f.dataset.level("v", 0, halved_by(1, Reduction::drawn)));
+  wanted[1] += 20 * 12 * 8 * 2 * 4;
+  ASSERT_TRUE(f.dataset.level("v", 0, halved_by(2, Reduction::drawn, 2)));
+  wanted[1] += 20 * 12 * 8 * 2 * 4;  // middles of kernels
+  wanted[2] += 10 * 6 * 4 * 2 * 4;   // their draws
+  const StoredPart box{{{4, 2, 0}, {8, 8, 8}}, 1, StoredAs::drawn};
+  ASSERT_TRUE(f.dataset.derived("v", 0, part_of(box, 2)));
+  wanted[1] += 8 * 8 * 8 * 2 * 4;
+  EXPECT_EQ(f.dataset.resident_bytes_of_levels(), wanted);
+  EXPECT_EQ(f.dataset.resident_bytes(), wanted[0] + wanted[1] + wanted[2]);
+  EXPECT_EQ(f.budget->counts().part_bytes, 16U * 8 * 4 * 4 + 8U * 8 * 8 * 2 * 4);
+
+  const auto difference = f.dataset.minus(f.dataset, 1);
+  ASSERT_TRUE(difference);
+  ASSERT_TRUE(Dataset(*difference).volume("f", 0));
+  wanted[0] += 40 * 24 * 16 * 4;  // step 1, but not the difference
+  EXPECT_EQ(f.dataset.resident_bytes_of_levels(), wanted);
+  EXPECT_EQ(f.dataset.resident_bytes(), wanted[0] + wanted[1] + wanted[2] + scalar_bytes);
+  f.dataset.evict();
+  EXPECT_EQ(f.dataset.resident_bytes_of_levels(), (Bytes{0, 0, 0}));
+  EXPECT_EQ(f.budget->counts().part_bytes, 0U);
+}
+
+// Chunks are 16 x 8 x 16 samples.
+TEST(Stored, BricksAreCountedByWhetherTheyAreInMemory) {
+  using Counts = std::array<std::uint64_t, 3>;
+  StoredFixture f;
+  const auto level = [&](const std::string& field, int h, Reduction how, int stride = 1) {
+    return f.dataset.level(field, 0, halved_by(h, how, stride)).has_value();
+  };
+  ASSERT_TRUE(level("f", 1, Reduction::two_values));  // 20 x 12 x 8 samples
+  Counts wanted{0, 4, 20 * 12 * 8 * 4 * 4};
+  EXPECT_EQ(f.bricks(), wanted);
+  ASSERT_TRUE(level("f", 1, Reduction::two_values));
+  wanted[0] += 4;
+  EXPECT_EQ(f.bricks(), wanted);
+  ASSERT_TRUE(level("v", 2, Reduction::drawn, 2));  // from the middles at level 1
+  wanted[1] += 4;
+  wanted[2] += 20 * 12 * 8 * 2 * 4;
+  EXPECT_EQ(f.bricks(), wanted);
+
+  const Box box{{10, 0, 0}, {10, 9, 16}};
+  EXPECT_FALSE(f.dataset.resident_only().part("f", 0, box));
+  EXPECT_EQ(f.bricks(), wanted) << "nothing was had or read";
+  ASSERT_TRUE(f.dataset.part("f", 0, box));
+  wanted[1] += 4;
+  wanted[2] += 10 * 9 * 16 * 4;
+  EXPECT_EQ(f.bricks(), wanted);
+  ASSERT_TRUE(f.dataset.part("f", 0, box));
+  ASSERT_TRUE(f.dataset.resident_only().part("f", 0, box));
+  wanted[0] += 8;
+  EXPECT_EQ(f.bricks(), wanted);
+  const StoredPart of_level{{{0, 7, 0}, {1, 2, 1}}, 1, StoredAs::drawn};
+  ASSERT_TRUE(f.dataset.derived("v", 0, part_of(of_level, 2)));
+  ASSERT_TRUE(f.dataset.resident_only().derived("v", 0, part_of(of_level, 2)));
+  wanted = {wanted[0] + 2, wanted[1] + 2, wanted[2] + 2 * 2 * 4};
+  EXPECT_EQ(f.bricks(), wanted);
+
+  ASSERT_TRUE(f.dataset.volume("v", 0));  // 3 x 3 x 1 chunks
+  wanted[1] += 9;
+  wanted[2] += 2 * scalar_bytes;
+  EXPECT_EQ(f.bricks(), wanted);
+  ASSERT_TRUE(f.dataset.volume("v", 0));
+  ASSERT_TRUE(f.dataset.resident_only().volume("v", 0));
+  ASSERT_TRUE(f.dataset.part("v", 0, {{0, 0, 0}, {1, 1, 1}})) << "a cut of the volume";
+  wanted[0] += 19;
+  EXPECT_EQ(f.bricks(), wanted);
+}
+
+TEST(Stored, BricksWaitWhileTheyAreRead) {
+  StoredFixture f;
+  std::uint64_t waiting = 0;
+  f.log->before_part = [&] {
+    waiting = f.budget->counts().bricks.waiting;
+    return Result<void>();
+  };
+  const Box box{{10, 0, 0}, {10, 9, 16}};
+  ASSERT_TRUE(f.dataset.part("f", 0, box));
+  EXPECT_EQ(waiting, 4U);
+  EXPECT_EQ(f.budget->counts().bricks.waiting, 0U);
+  f.log->before_part = [] { return make_error(ErrorKind::bad_data, "torn"); };
+  EXPECT_FALSE(f.dataset.part("f", 1, box));
+  EXPECT_EQ(f.budget->counts().bricks.waiting, 0U);
+  EXPECT_EQ(f.budget->counts().bricks.read, 4U) << "failed reads are not counted";
+}
+
+TEST(Stored, DataWithoutLevelsHaveNoBricks) {
+  StoredFixture f(100 * scalar_bytes, With::samples_alone);
+  ASSERT_TRUE(f.dataset.part("f", 0, {{0, 0, 0}, {2, 2, 2}}));
+  for (int round = 0; round < 2; ++round) ASSERT_TRUE(f.dataset.volume("f", 0));
+  ASSERT_TRUE(f.dataset.level("f", 0, halved_by(1, Reduction::two_values)));
+  EXPECT_EQ(f.bricks(), (std::array<std::uint64_t, 3>{}));
+  EXPECT_TRUE(f.dataset.resident_bytes_of_levels().empty());
+  EXPECT_EQ(f.budget->counts().part_bytes, 2 * 2 * 2 * 4U);
 }
 
 TEST(Stored, AFieldThatDoesNotFitNeedsItsCoarsestLevel) {

@@ -46,10 +46,12 @@ function fieldRow(field: Dataset["fields"][number]): Row {
   return [field.name, [long === field.name ? "" : long, range].filter((part) => part).join("; ")];
 }
 
-function levelRow({ dims, bricks, storedBytes }: Level, number: number): Row {
+function levelRow({ dims, bricks, storedBytes, residentBytes }: Level, number: number): Row {
   const count = bricks === 1 ? "one brick" : `${bricks} bricks`;
   const stored = storedBytes === undefined ? "" : `, ${formatBytes(storedBytes)} on disk`;
-  return [String(number), `${dims.x} x ${dims.y} x ${dims.z} samples in ${count}${stored}`];
+  const resident = residentBytes === 0 ? "" : `, ${formatBytes(residentBytes)} in memory`;
+  const samples = `${dims.x} x ${dims.y} x ${dims.z} samples`;
+  return [String(number), `${samples} in ${count}${stored}${resident}`];
 }
 
 // Only what the description has: a dataset without notes has no section of notes.
@@ -78,11 +80,27 @@ export class About {
   private readonly dialog = byId("about", HTMLDialogElement);
   private readonly title = byId("about-title", HTMLElement);
   private readonly body = byId("about-body", HTMLElement);
+  private shown = "";
 
+  constructor(private readonly describe: (id: string) => Promise<Dataset>) {}
+
+  // Of a dataset with levels it is asked for what is in memory by now.
   show(dataset: Dataset): void {
+    this.shown = dataset.id;
+    this.fill(dataset);
+    this.dialog.showModal();
+    if (dataset.levels === undefined) return;
+    this.describe(dataset.id).then(
+      (now) => {
+        if (this.dialog.open && this.shown === now.id) this.fill(now);
+      },
+      () => {}, // on failure it keeps what was known
+    );
+  }
+
+  private fill(dataset: Dataset): void {
     this.title.textContent = dataset.title;
     this.body.replaceChildren(...aboutSections(dataset).flatMap(sectionElements));
-    this.dialog.showModal();
   }
 }
 

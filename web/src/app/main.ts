@@ -88,7 +88,7 @@ const timeBar = new TimeBar({
   settings: () => app.playback.again(),
 });
 const hud = new Hud();
-const about = new About();
+const about = new About((id) => app.api.describe(id));
 const panelBox = byId("panel", HTMLElement);
 const host = {
   view: () => app.view(),

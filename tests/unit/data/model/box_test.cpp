@@ -154,6 +154,18 @@ TEST(Box, ShareIsThatOfTheSamplesInItsChunks) {
   }
 }
 
+TEST(Box, ChunksAreThoseOfItsSamples) {
+  std::mt19937 random(12);
+  for (int round = 0; round < 500; ++round) {
+    const DrawnBox drawn = draw_box(random);
+    std::size_t chunks = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      chunks *= box_chunks_of(drawn.box, a, 1, drawn.field).size();
+    }
+    ASSERT_EQ(chunks_of(drawn.box, drawn.field), chunks) << key_of(drawn.box);
+  }
+}
+
 TEST(Box, LayersAreLeftOutWhereThatSavesMoreThanARead) {
   FieldInfo wind;
   wind.components = {"u", "v"};
