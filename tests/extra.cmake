@@ -194,6 +194,10 @@ else()
   windsplat_fault_test(inject inject.py --shim=$<TARGET_FILE:faults_shim> --slack=${fault_slack})
 endif()
 windsplat_fault_test(table faults.py --slack=${fault_slack})
+if(WINDSPLAT_SANITIZE)
+  # Minutes. The other tests of the daemon run the same code: signals, drawn, edge, integration.
+  set_tests_properties(faults.table PROPERTIES LABELS "thorough;integration")
+endif()
 windsplat_fault_test(signals signals.py --slack=${fault_slack})
 
 include(${CMAKE_CURRENT_LIST_DIR}/clients/python.cmake)
