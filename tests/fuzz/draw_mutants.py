@@ -2,7 +2,7 @@
 """Mutates small datasets whose values are all known, and compares the reports and pictures of two
 daemons with them.
 
-    tests/fuzz/draw_mutants.py --count 340                # the short form, in ctest
+    tests/fuzz/draw_mutants.py --first 34 --count 170     # the short form, in ctest
     tests/fuzz/draw_mutants.py --count 10000 --reasons 20
     tests/fuzz/draw_mutants.py --only 1234 --keep found   # one file again, kept in a folder
 
@@ -343,6 +343,7 @@ def parsed_options():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--program", default=str(build / "release/windsplat"))
     parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first file")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="number of the only file to test")
     parser.add_argument("--format", help="the only format to test")
@@ -363,9 +364,9 @@ def main():
         (folder / "root").mkdir()
         processes = [Process(options, folder / "root", folder / f"threads-{n}", n) for n in (1, 3)]
         run = Run(options, processes, folder / "root")
-        numbers = range(options.count) if options.only is None else [options.only]
+        numbers = range(options.first, options.first + options.count)
         try:
-            for number in numbers:
+            for number in numbers if options.only is None else [options.only]:
                 run.one(number)
             for process in processes:
                 run.finish(process)
