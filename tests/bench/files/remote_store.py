@@ -81,15 +81,16 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.send_header("Content-Length", "0")
             self.end_headers()
             return
-        body = path.read_bytes()
-        size, wanted = len(body), self.headers.get("Range")
+        size, wanted = path.stat().st_size, self.headers.get("Range")
+        first, last = 0, size - 1
         if wanted:
             first, last = map(int, wanted.removeprefix("bytes=").split("-"))
-            body = body[first:last + 1]
-            self.send_response(206)
+        with open(path, "rb") as file:
+            file.seek(first)
+            body = file.read(last + 1 - first)
+        self.send_response(206 if wanted else 200)
+        if wanted:
             self.send_header("Content-Range", f"bytes {first}-{first + len(body) - 1}/{size}")
-        else:
-            self.send_response(200)
         self.send_header("ETag", f'"{path.stat().st_mtime_ns}"')
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
