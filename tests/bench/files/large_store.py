@@ -64,7 +64,7 @@ def convert(options, store):
     fields = [f"--field={name}" for name in options.fields.split(",") if name]
     begun, used = time.monotonic(), os.times()
     process = subprocess.Popen([options.program, "convert", options.data, "-o", store, *fields,
-                                "--steps", "0:1", "--memory-limit", options.memory_limit],
+                                "--steps", "0:0", "--memory-limit", options.memory_limit],
                                stdout=subprocess.DEVNULL)
     memory = PeakPss(process.pid, 0.1)
     if process.wait() != 0:
