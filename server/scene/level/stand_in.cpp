@@ -16,8 +16,16 @@ namespace windsplat::scene {
 
 namespace {
 
-// Of the memory limit, beside two boxes.
+// Of the memory limit, beside two boxes; and in bytes, as it is read before what is wanted.
 constexpr double base_share_max = 0.1;
+constexpr std::uint64_t base_bytes_max = std::uint64_t{64} << 20;
+
+bool is_finer(const std::array<int, 3>& level, const std::array<int, 3>& than) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (level[a] < than[a]) return true;
+  }
+  return false;
+}
 
 // nullopt: there is no such part.
 std::optional<data::Derivation> derivation_of(const ShownField& shown,
@@ -114,6 +122,7 @@ bool is_base(const std::vector<ShownField>& shown, const data::Dataset& dataset)
     bytes += dataset.level_bytes(field, how) + dataset.bytes_beside_level(field, how);
     fields.push_back(field);
   }
+  if (bytes > base_bytes_max) return false;
   const auto all = static_cast<std::uint64_t>(static_cast<double>(bytes) / base_share_max);
   return dataset.fits_beside_boxes(all, fields);
 }
@@ -127,9 +136,7 @@ std::optional<Substitute> stand_in_for(const CompletedView& completed, const Dra
   const std::uint64_t missing = shown.missing_bytes(wanted);
   if (missing == 0) return std::nullopt;
   for (const std::array<int, 3>& level : dataset.info().stored->levels) {
-    bool finer = false;
-    for (std::size_t a = 0; a < 3; ++a) finer = finer || level[a] < wanted.halvings[a];
-    if (finer) continue;
+    if (is_finer(level, wanted.halvings)) continue;
     const bool same = level == wanted.halvings;
     if (!same && !may_merge(completed.view())) break;
     const auto fields = shown.at(level);
@@ -153,9 +160,11 @@ std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset
   const auto& levels = dataset.info().stored->levels;
   std::vector<ShownField> base;
   for (std::size_t n = levels.size(); n > 0 && may_merge(completed.view()); --n) {
-    auto finer = shown.at(levels[n - 1]);
-    if (levels[n - 1] == wanted.halvings || !is_base(finer, dataset)) break;
-    base = std::move(finer);
+    const std::array<int, 3>& level = levels[n - 1];
+    if (level == wanted.halvings || is_finer(level, wanted.halvings)) break;
+    auto next = shown.at(level);
+    if (!is_base(next, dataset)) break;
+    base = std::move(next);
   }
   add(base, std::nullopt);
   add(shown.at(wanted.halvings), wanted.box);

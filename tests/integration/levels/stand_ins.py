@@ -105,7 +105,7 @@ class StandIns(unittest.TestCase):
         return answer.body
 
     def settled(self, session):
-        """Moves the view a little, and waits until its coarsest level is in memory too."""
+        """Moves the view a little, and waits until the level that stands in is in memory too."""
         session.frame_of(session.patch(VIEW), final=True)
         session.frame_of(session.patch({"camera": looking_at(-0.8001, -0.4)}), final=True)
         before = None

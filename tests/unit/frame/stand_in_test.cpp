@@ -170,6 +170,32 @@ TEST(StandIn, ALevelThatTakesLittleIsLoadedFirst) {
   EXPECT_EQ(substitute(completed, wide)->part.halvings, (std::array{2, 2, 2}));
 }
 
+// Also of those that are computed and not stored, as their axes are halved one by one.
+TEST(StandIn, WhatIsLoadedFirstStandsInForEveryLevel) {
+  Random random(5);
+  int computed = 0;
+  int stored = 0;
+  for (int n = 0; n < 60; ++n) {
+    data::Dataset wide = store(8 * samples_bytes, true);
+    const protocol::View other = random_view(random);
+    protocol::View view = of_one_voxel();
+    view.camera = other.camera;
+    view.image = other.image;
+    const auto completed = scene::complete(view, wide).value();
+    const auto loads = scene::loads_of(completed, wide);
+    if (loads.size() < 2) continue;
+    const auto& levels_there = wide.info().stored->levels;
+    const auto wanted = scene::part_of(completed, wide).halvings;
+    const bool is_stored =
+        std::find(levels_there.begin(), levels_there.end(), wanted) != levels_there.end();
+    (is_stored ? stored : computed) += 1;
+    ASSERT_TRUE(wide.derived(loads[0].field, 0, loads[0].how));
+    EXPECT_TRUE(substitute(completed, wide)) << n;
+  }
+  EXPECT_GT(stored, 3);
+  EXPECT_GT(computed, 3);
+}
+
 TEST(StandIn, NoLevelIsLoadedFirstThatTakesMuch) {
   data::Dataset tight = store(samples_bytes);
   protocol::View view = of_one_voxel();
