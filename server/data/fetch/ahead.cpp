@@ -33,9 +33,9 @@ std::vector<Extent> pieces_of(std::vector<Extent> extents, std::uint64_t file_by
     std::uint64_t begin = one.begin / block * block;
     if (!out.empty()) begin = std::max(begin, out.back().end);
     while (begin < end) {
-      if (out.size() > Ahead::pieces_max) return out;
       const bool grows =
           !out.empty() && out.back().end == begin && bytes_of(out.back()) < Ahead::piece_bytes;
+      if (!grows && out.size() >= Ahead::pieces_max) return out;
       if (!grows) out.push_back({begin, begin});
       out.back().end = std::min(end, out.back().begin + Ahead::piece_bytes);
       begin = out.back().end;
@@ -103,7 +103,6 @@ void Ahead::drop_all() {
   pieces_.clear();
   unread_.pieces.clear();
   count(fetcher_.ahead_limits(), unread_.bytes, 0);
-  unread_.file_bytes = piece_bytes;
 }
 
 void Ahead::forget() {
@@ -119,22 +118,28 @@ bool Ahead::give_way() {
   return !std::exchange(is_off_, true);
 }
 
-bool Ahead::has_room() const {
+bool Ahead::has_room(std::uint64_t bytes) const {
   const Fetcher::AheadLimits& limits = fetcher_.ahead_limits();
-  if (limits.unread_bytes + piece_bytes > limits.all_bytes_max) return false;
-  std::uint64_t bytes = unread_.bytes + unread_.file_bytes;
+  if (limits.unread_bytes + bytes > limits.all_bytes_max) return false;
+  bytes += unread_.bytes;
   for (const OpeningPtr& one : openings_) {
     if (one->is_under_way) bytes += one->bytes;
   }
   return bytes <= limits.bytes_max;
 }
 
+bool Ahead::may_open(const Opening& one) const {
+  return !one.is_under_way && (one.what.in_parts || !are_large_) &&
+         has_room(fetcher_.ahead_limits().file_bytes_max);
+}
+
 void Ahead::start() {
   const auto waiting = std::count_if(openings_.begin(), openings_.end(),
-                                     [](const OpeningPtr& one) { return !one->is_under_way; });
-  std::size_t wanted = pieces_.size() + static_cast<std::size_t>(waiting);
+                                     [&](const OpeningPtr& one) { return may_open(*one); });
+  std::size_t wanted = static_cast<std::size_t>(waiting);
+  if (has_room(piece_bytes)) wanted += pieces_.size();
   for (Worker& worker : workers_) {
-    if (worker.works || wanted == 0 || !has_room() || !fetcher_.ahead_limits().begin()) continue;
+    if (worker.works || wanted == 0 || !fetcher_.ahead_limits().begin()) continue;
     --wanted;
     if (worker.thread.joinable()) worker.thread.join();  // it has left the mutex, or is about to
     worker.works = true;
@@ -164,14 +169,14 @@ void Ahead::work(Worker& self) {
 }
 
 Ahead::Work Ahead::next() {
-  while (!pieces_.empty() && has_room()) {
+  while (!pieces_.empty() && has_room(piece_bytes)) {
     Piece piece = std::move(pieces_.front());
     pieces_.pop_front();
     if (!piece.file->is_present(piece.extent)) return fetching(std::move(piece));
   }
   const auto waiting = std::find_if(openings_.begin(), openings_.end(),
-                                    [](const OpeningPtr& one) { return !one->is_under_way; });
-  return waiting == openings_.end() || !has_room() ? Work() : opening(*waiting);
+                                    [&](const OpeningPtr& one) { return may_open(*one); });
+  return waiting == openings_.end() ? Work() : opening(*waiting);
 }
 
 Ahead::Work Ahead::fetching(Piece piece) {
@@ -191,7 +196,7 @@ Ahead::Work Ahead::fetching(Piece piece) {
 
 Ahead::Work Ahead::opening(const OpeningPtr& one) {
   one->is_under_way = true;
-  one->bytes = unread_.file_bytes;
+  one->bytes = fetcher_.ahead_limits().file_bytes_max;
   return [this, one, round = round_.load()] {
     Result<FetchedFile> file = make_error(ErrorKind::cancelled, "it was not opened");
     try {
@@ -216,9 +221,8 @@ void Ahead::finish(const OpeningPtr& one, Result<FetchedFile> file) {
   } else if (file && ::fstat(file->file.number(), &status) == 0) {
     one->bytes = static_cast<std::uint64_t>(status.st_size);
   } else if (!file && file.error().kind == ErrorKind::too_large) {
-    unread_.file_bytes = fetcher_.ahead_limits().bytes_max;
+    are_large_ = true;
   }
-  unread_.file_bytes = std::max(unread_.file_bytes, one->bytes);
   one->file = std::move(file);
 }
 

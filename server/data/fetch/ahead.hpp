@@ -67,9 +67,8 @@ class Ahead {
     Extent extent;
   };
   struct Unread {
-    std::list<Piece> pieces;                 // under way, or fetched and not read
-    std::uint64_t bytes = 0;                 // of them
-    std::uint64_t file_bytes = piece_bytes;  // of the largest file fetched as a whole, at least
+    std::list<Piece> pieces;  // under way, or fetched and not read
+    std::uint64_t bytes = 0;  // of them
   };
   struct Worker {
     std::thread thread;
@@ -88,7 +87,8 @@ class Ahead {
   void add_pieces(const std::string& url, const std::shared_ptr<SparseFile>& file,
                   const Expected& what);
   void finish(const OpeningPtr& one, Result<FetchedFile> file);
-  [[nodiscard]] bool has_room() const;
+  [[nodiscard]] bool has_room(std::uint64_t bytes) const;
+  [[nodiscard]] bool may_open(const Opening& one) const;
 
   Fetcher& fetcher_;
   std::atomic<std::uint64_t> round_ = 0;  // requests of earlier rounds are not wanted any more
@@ -100,6 +100,7 @@ class Ahead {
   std::list<OpeningPtr> openings_;  // waiting, under way, or not taken yet
   std::deque<Piece> pieces_;        // waiting
   Unread unread_;
+  bool are_large_ = false;  // the files fetched as a whole, which are left to the reader
 };
 
 }  // namespace windsplat::data::fetch

@@ -12,6 +12,7 @@ namespace {
 constexpr std::size_t idle_clients_max = 16;
 constexpr int ahead_threads_max = 32;
 constexpr std::uint64_t ahead_bytes_max = std::uint64_t{64} << 20;
+constexpr std::uint64_t ahead_files = 8;    // fetched as a whole at a time within that
 constexpr std::uint64_t ahead_share = 4;    // of the cache
 constexpr std::size_t idle_parts_max = 64;  // files open without a reader
 constexpr std::uint64_t kept_share = 4;     // of the cache, for a file that was read to its end
@@ -48,6 +49,7 @@ Fetcher::Fetcher(FetchOptions options)
     : options_(std::move(options)), rules_(std::make_shared<const HostRules>(options_.rules)) {
   ahead_.all_bytes_max = options_.cache.bytes_max / ahead_share;
   ahead_.bytes_max = std::min(ahead_bytes_max, ahead_.all_bytes_max);
+  ahead_.file_bytes_max = ahead_.bytes_max / ahead_files;
 }
 
 Result<std::unique_ptr<Fetcher>> Fetcher::open(FetchOptions options) {
@@ -107,7 +109,7 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
   if (!request) return request.error();
   if (mark < text.size()) request->query = text.substr(mark + 1);
   if (purpose == Purpose::ahead) {
-    request->limits.bytes_max = std::min(request->limits.bytes_max, ahead_.bytes_max);
+    request->limits.bytes_max = std::min(request->limits.bytes_max, ahead_.file_bytes_max);
   }
   const std::string key = request->url.text() + text.substr(mark);
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
@@ -181,7 +183,8 @@ Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, st
   if (out && file.fetched_bytes() >= file.bytes()) keep_whole(file);
   if (out) return out;
   const ErrorKind kind = out.error().kind;
-  if (kind == ErrorKind::bad_data || kind == ErrorKind::not_found) forget_parts(file.url());
+  const bool is_gone = kind == ErrorKind::bad_data || kind == ErrorKind::not_found;
+  if (is_gone && purpose == Purpose::read) forget_parts(file.url());
   return out;
 }
 

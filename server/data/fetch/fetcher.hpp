@@ -74,6 +74,7 @@ class Fetcher {
   // What may be fetched ahead of its readers.
   struct AheadLimits {
     std::uint64_t bytes_max = 0;                  // of a dataset, on disk before they are read
+    std::uint64_t file_bytes_max = 0;             // of a file that is fetched as a whole
     std::uint64_t all_bytes_max = 0;              // of parts of all datasets, about
     std::atomic<std::uint64_t> unread_bytes = 0;  // of these
     std::atomic<int> threads = 0;

@@ -229,6 +229,32 @@ TEST_F(FetchedAhead, TheWindowIsOfAllDatasets) {
   EXPECT_EQ(fetcher_->ahead_limits().unread_bytes, 0);
 }
 
+TEST_F(FetchedAhead, WholeFilesAreFetchedAsFarAsTheWindowOnly) {
+  host_.holds = true;
+  fetcher_->ahead_limits().bytes_max = 3 * PartsHost::file_bytes;
+  fetcher_->ahead_limits().file_bytes_max = PartsHost::file_bytes;
+  const auto url_of = [&](int n) { return host_.origin() + '/' + std::to_string(n); };
+  for (int n = 0; n < 10; ++n) ahead_->expect(url_of(n), nullptr, {.name = "b"});
+  settle(3);
+  EXPECT_EQ(host_.requests, 3);
+  host_.holds = false;
+  EXPECT_TRUE(ahead_->take(url_of(0), {}));
+  settle(4);
+  EXPECT_EQ(host_.requests, 4) << "what is not read is not left out";
+}
+
+TEST_F(FetchedAhead, LargeFilesAreLeftToTheReaderOnceOneWasSeen) {
+  fetcher_->ahead_limits().file_bytes_max = mib;
+  for (int call = 0; call < 3; ++call) {
+    for (int n = 0; n < 20; ++n) {
+      ahead_->expect(host_.origin() + '/' + std::to_string(n), nullptr, {.name = "b"});
+    }
+    settle(1);
+    EXPECT_LE(host_.requests, 8);
+    ahead_->forget();
+  }
+}
+
 TEST_F(FetchedAhead, AFileOfMoreThanTheWindowIsLeftToItsReader) {
   make(32 * mib);
   const std::string whole = host_.origin() + "/whole";
