@@ -279,10 +279,12 @@ class StoreScan {
 
   // Coordinates and statistics, which are read next, one after the other.
   void expect_small() {
+    constexpr std::size_t bytes_max = std::size_t{1} << 20;
     const auto expect = [this](const Array& array) {
       const bool is_small = array.metadata.shape.size() <= 2 && !array.line &&
                             array.metadata.problem.empty() && !array.metadata.shard;
       if (!is_small || file_count(array.metadata) != 1) return;
+      if (array.metadata.chunk_items() * array.metadata.dtype.bytes > bytes_max) return;
       files_.expect({.name = array.path + file_key(array.metadata, 0)});
     };
     for (const Array& array : out_.arrays) expect(array);
