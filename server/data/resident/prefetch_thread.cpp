@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -32,14 +33,9 @@ struct PrefetchThread::State {
       queue.requests.pop_front();
       if (queue.requests.empty()) queues.erase(owner);
       lock.unlock();
-      const Outcome outcome = load(*request);
-      const auto key = request->dataset.key_of(request->field, request->step, request->how);
+      const Outcome outcome = load(*request, owner);
       request.reset();
       lock.lock();
-      const auto unreadable = failed.find(owner);
-      if (outcome == Outcome::failed && key && unreadable != failed.end()) {
-        unreadable->second.insert_or_assign(*key, Clock::now());
-      }
       // If there is no room for this request, there is none for the later ones, until they are
       // replaced.
       const auto rest = queues.find(owner);
@@ -58,13 +54,32 @@ struct PrefetchThread::State {
 
   enum class Outcome : std::uint8_t { done, no_room, failed };
 
-  static Outcome load(const PrefetchRequest& request) noexcept {
+  Outcome load(const PrefetchRequest& request, std::uint64_t owner) noexcept {
     try {
-      return try_to_load(request);
+      const Outcome outcome = try_to_load(request);
+      if (outcome == Outcome::failed) note_failed(request, owner);
+      return outcome;
     } catch (const std::exception&) {
       log::error("prefetch failed");  // no details: there may be no memory for them
       return Outcome::no_room;
     }
+  }
+  // Unless the owner has withdrawn its requests.
+  void note_failed(const PrefetchRequest& request, std::uint64_t owner) {
+    const auto key = request.dataset.key_of(request.field, request.step, request.how);
+    const std::lock_guard lock(mutex);
+    if (key && owners.contains(owner)) failed[owner].insert_or_assign(*key, Clock::now());
+  }
+  // Whether it failed a short while ago.
+  bool has_failed(std::uint64_t owner, const ResidentKey& key) {
+    const std::lock_guard lock(mutex);
+    const auto of = failed.find(owner);
+    if (of == failed.end()) return false;
+    const auto one = of->second.find(key);
+    if (one == of->second.end()) return false;
+    if (Clock::now() < one->second + retry_after) return true;
+    of->second.erase(one);
+    return false;
   }
   static Outcome try_to_load(const PrefetchRequest& request) {
     const auto loaded =
@@ -90,8 +105,9 @@ struct PrefetchThread::State {
     std::uint64_t version = 0;             // distinguishes them from later requests of the owner
   };
   std::map<std::uint64_t, Queue> queues;  // keyed by owner
-  // What could not be read of the requests of each owner that has some, and when. It is not tried
-  // again for a while: a moving view repeats its requests at each frame.
+  std::set<std::uint64_t> owners;         // that have requests
+  // What could not be read of them, and when. It is not tried again for a while: a moving view
+  // repeats its requests at each frame.
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds retry_after{10};
   std::map<std::uint64_t, std::map<ResidentKey, Clock::time_point>> failed;
@@ -118,6 +134,7 @@ void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchR
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);
+    state_->owners.erase(owner);
     state_->failed.erase(owner);
     return;
   }
@@ -128,18 +145,13 @@ void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchR
     const auto own = request.dataset.key_of(request.field, request.step, request.how);
     if (!own) continue;
     keys.push_back(*own);
-    if (!state_->budget->has(*own)) absent.push_back(std::move(request));
+    if (state_->budget->has(*own) || state_->has_failed(owner, *own)) continue;
+    absent.push_back(std::move(request));
   }
   state_->budget->request_prefetch(owner, keys);
   {
     const std::lock_guard lock(state_->mutex);
-    auto& failed = state_->failed[owner];
-    const auto retried = State::Clock::now() - State::retry_after;
-    std::erase_if(failed, [&](const auto& one) { return one.second <= retried; });
-    std::erase_if(absent, [&](const PrefetchRequest& request) {
-      const auto own = request.dataset.key_of(request.field, request.step, request.how);
-      return failed.contains(own.value());
-    });
+    state_->owners.insert(owner);
     if (absent.empty()) {
       state_->queues.erase(owner);
     } else {
