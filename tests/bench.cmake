@@ -76,6 +76,8 @@ windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FIL
 windsplat_smoke(large_store python3 ${bench_dir}/files/large_store.py
   --program=$<TARGET_FILE:windsplat> --data=tornado:96x96x64 --memory-limit=192M --size=64x48
   --seconds=1 --disk-mib=8)
+windsplat_smoke(remote_store /usr/bin/python3 ${bench_dir}/files/remote_store.py
+  --program=$<TARGET_FILE:windsplat> --side=32 --delay=0.001)
 windsplat_smoke(memory_limit python3 ${bench_dir}/playback.py
   --program=$<TARGET_FILE:windsplat> --sessions=8 --apart --steps=12 --seconds=8 --size=160x120
   --memory-limit=192M --check-memory)
