@@ -92,6 +92,12 @@ class RemoteStores(unittest.TestCase):
                   for at in range(0, count, 1 << 16)]
         self.assertEqual(len(blocks), len(set(blocks)), "nothing is fetched twice")
 
+    def test_opening_reads_no_index_of_a_shard(self):
+        subprocess.run([PROGRAM, "inspect", f"{self.host.origin}/v3.zarr", "--ranges", "none",
+                        "--allow-private-data-hosts", "--data-cache", self.cache, "--data-host",
+                        self.host.origin], check=True, capture_output=True, timeout=60)
+        self.assertEqual(self.host.parts, [])
+
     def test_of_a_store_only_what_is_read_is_fetched(self):
         self.far("v3.zarr")
         all_bytes = sum(len(body) for name, body in self.host.files.items()

@@ -342,6 +342,7 @@ cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
   const Array& array = array_of(variable);
   const ArrayMetadata& metadata = array.metadata;
   if (!std::isnan(absent_value(metadata, false))) return {};
+  if (files_->location().fetched) return {};  // indices are fetched when chunks are read
   std::size_t chunks = 1;
   ChunkRange all{std::vector<std::size_t>(metadata.shape.size(), 0), {}};
   for (std::size_t d = 0; d < metadata.shape.size(); ++d) {
