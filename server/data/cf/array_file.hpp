@@ -38,6 +38,13 @@ struct Unwritten {
   bool is_all = true;  // whether all chunks were examined
 };
 
+// A block of a variable. start, count: one per dimension, slowest first.
+struct Block {
+  int variable = 0;
+  std::vector<std::size_t> start;
+  std::vector<std::size_t> count;
+};
+
 class ArrayFile {
  public:
   virtual ~ArrayFile() = default;
@@ -69,6 +76,9 @@ class ArrayFile {
   // The same for a variable of type float32, without conversion.
   virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
                             const std::vector<std::size_t>& count, float* out) const = 0;
+  // A hint of what is read next, in this order and perhaps in smaller blocks; replaces the last
+  // one.
+  virtual void expect(const std::vector<Block>& /*blocks*/) const {}
   // Checks which chunks of a variable were written, for at most `most` chunks, without reading
   // them.
   [[nodiscard]] virtual Unwritten unwritten(int /*variable*/, std::size_t /*most*/) const {

@@ -329,6 +329,20 @@ double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int vari
   return std::max(decoded_bytes(file, variable, start, count), volume);
 }
 
+void expect_box(const ArrayFile& file, const Placement& grid, const std::vector<int>& variables,
+                std::size_t step, const Box& box) {
+  std::ptrdiff_t origin = 0;
+  std::vector<Block> blocks;
+  for (const int variable : variables) {
+    Block& block = blocks.emplace_back(Block{variable, {}, {}});
+    for (const Way& way : ways_of(file, grid, variable, step, box, origin)) {
+      block.start.push_back(way.first);
+      block.count.push_back(way.length);
+    }
+  }
+  file.expect(blocks);
+}
+
 Result<void> read_levels(const ArrayFile& file, const Placement& grid, int variable,
                          std::size_t step, const Levels& levels, float* out, const Progress& tell) {
   return read_box(file, grid, variable, step, box_of(grid, levels), out, tell);

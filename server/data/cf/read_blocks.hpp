@@ -36,6 +36,10 @@ Result<void> read_levels(const ArrayFile& file, const Placement& grid, int varia
 Result<void> read_box(const ArrayFile& file, const Placement& grid, int variable, std::size_t step,
                       const Box& box, float* out, const Progress& tell);
 
+// Tells the file that a box of these variables will be read.
+void expect_box(const ArrayFile& file, const Placement& grid, const std::vector<int>& variables,
+                std::size_t step, const Box& box);
+
 // Masks columns, x fastest in rows of `width`, in the values of a box of samples. Empty: none.
 void mask_columns(const std::vector<bool>& columns, const Box& box, std::size_t width,
                   float* values);

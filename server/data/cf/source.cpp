@@ -58,9 +58,7 @@ class ArraySource final : public FileSource {
     const std::size_t notes_of_file = info_.notes.size();
     if (!choice_.note.empty()) info_.notes.push_back(choice_.note);
     info_.choices = file_->contents().choices;
-    if (auto done = find_axes(); !done) {
-      return named(done.error());
-    }
+    if (auto done = find_axes(); !done) return named(done.error());
     if (auto done = find_steps(*file_, choice_.time, coordinate_of(choice_.time), info_); !done) {
       return named(done.error());
     }
@@ -72,9 +70,7 @@ class ArraySource final : public FileSource {
     if (!heights) return named(heights.error());
     heights_ = std::move(*heights);
     find_ground(*file_, heights_, placement_, info_);
-    if (auto done = find_fields(); !done) {
-      return named(done.error());
-    }
+    if (auto done = find_fields(); !done) return named(done.error());
     if (info_.fields.empty()) {
       return named(
           make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB a step"));
@@ -110,6 +106,7 @@ class ArraySource final : public FileSource {
         return done;
       }
     }
+    if (plan.derived < 0) expect_box(*file_, placement_, plan.variables, step, all_samples());
     for (std::size_t c = 0; plan.derived < 0 && c < plan.variables.size(); ++c) {
       const auto part = [&](double done) {
         tell((static_cast<double>(c) + done) / static_cast<double>(plan.variables.size()));
@@ -140,6 +137,7 @@ class ArraySource final : public FileSource {
       parts.push_back(level_parts(*file_, placement_, v, taker.layers_max()));
       if (parts.back().empty()) return false;
     }
+    expect_box(*file_, placement_, plan.variables, step, all_samples());
     const auto all = static_cast<double>(parts.size() * placement_.length[2]);
     std::size_t done = 0;
     for (std::size_t c = 0; c < parts.size(); ++c) {
@@ -169,6 +167,7 @@ class ArraySource final : public FileSource {
     if (!info_.fields[field].is_read_by_boxes()) return false;
     const Box& box = part.box;
     const Plan& plan = plans_[field];
+    expect_box(*file_, placement_, plan.variables, step, box);
     for (std::size_t c = 0; c < plan.variables.size(); ++c) {
       const int v = plan.variables[c];
       float* const values = out + c * box.samples();
@@ -283,6 +282,7 @@ class ArraySource final : public FileSource {
   }
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
+  [[nodiscard]] Box all_samples() const { return whole_box(info_.grid.dims()); }
   // A box of so many whole layers.
   [[nodiscard]] Box layers(std::size_t count) const {
     Box out = whole_box(info_.grid.dims());

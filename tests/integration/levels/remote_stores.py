@@ -40,6 +40,27 @@ class Meter:
         return part
 
 
+class Gate:
+    """Holds the first part of these files that is asked for until parts of all of them were."""
+
+    def __init__(self, host, paths):
+        self.host, self.paths = host, {f"/{path}" for path in paths}
+        self.came = threading.Condition()
+        self.was_held = self.has_opened = False
+
+    def asked(self):
+        with self.host.lock:
+            return self.paths & {path for path, _, _ in self.host.parts}
+
+    def __call__(self, first, part, sent):
+        with self.came:
+            self.came.notify_all()
+            if self.asked() and not self.was_held:
+                self.was_held = True
+                self.has_opened = self.came.wait_for(lambda: self.asked() == self.paths, timeout=5)
+        return part
+
+
 class RemoteStores(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -51,6 +72,15 @@ class RemoteStores(unittest.TestCase):
             '{"windsplat": "raw", "file": "noise.bin", "type": "float32", "endian": "little",'
             '"dims": {"x": 256, "y": 320, "z": 96}, "steps": {"count": 4},'
             '"fields": [{"name": "a"}]}')
+        wind = rng.normal(size=(3, 96, 192, 192)).astype("<f4")
+        (cls.folder / "wind.bin").write_bytes(wind.tobytes())
+        (cls.folder / "wind.json").write_text(
+            '{"windsplat": "raw", "file": "wind.bin", "type": "float32", "endian": "little",'
+            '"dims": {"x": 192, "y": 192, "z": 96}, "steps": {"count": 1}, "fields":'
+            '[{"name": "wind", "components": ["u", "v", "w"], "layout": "planar"}]}')
+        subprocess.run([PROGRAM, "convert", cls.folder / "wind.json", "-o",
+                        cls.folder / "wind.zarr"], check=True, capture_output=True)
+        (cls.folder / "wind.bin").unlink()
         for version in ("3", "2"):
             subprocess.run([PROGRAM, "convert", cls.folder / "noise.json", "-o",
                             cls.folder / f"v{version}.zarr", "--zarr-format", version], check=True,
@@ -72,17 +102,18 @@ class RemoteStores(unittest.TestCase):
         self.meter = self.host.altered = Meter()
         self.cache = pathlib.Path(tempfile.mkdtemp(dir=self.folder)) / "cache"
 
-    def picture(self, name, *options):
+    def picture(self, name, *options, step=2):
         path = self.cache.parent / "picture.npy"
         done = subprocess.run(
-            [PROGRAM, "render", name, "--step", "2", "--size", "96x64", "-o", path,
+            [PROGRAM, "render", name, "--step", str(step), "--size", "96x64", "-o", path,
              *map(str, options)], capture_output=True, text=True, check=False, timeout=60)
         self.assertEqual(done.returncode, 0, done.stderr)
         return np.load(path)
 
-    def far(self, store, *options):
+    def far(self, store, *options, step=2):
         return self.picture(f"{self.host.origin}/{store}", "--allow-private-data-hosts",
-                            "--data-cache", self.cache, "--data-host", self.host.origin, *options)
+                            "--data-cache", self.cache, "--data-host", self.host.origin, *options,
+                            step=step)
 
     def test_chunks_of_a_shard_are_fetched_by_several_requests_at_a_time(self):
         np.testing.assert_array_equal(self.far("v3.zarr"), self.picture(self.folder / "v3.zarr"))
@@ -97,6 +128,14 @@ class RemoteStores(unittest.TestCase):
                         "--allow-private-data-hosts", "--data-cache", self.cache, "--data-host",
                         self.host.origin], check=True, capture_output=True, timeout=60)
         self.assertEqual(self.host.parts, [])
+
+    def test_shards_of_all_components_are_opened_at_the_same_time(self):
+        for level, limit in ((0, "1G"), (2, "192M")):
+            self.setUp()
+            gate = self.host.altered = Gate(
+                self.host, [f"wind.zarr/{level}/{name}/c/0/0/0/0" for name in "uvw"])
+            self.far("wind.zarr", "--memory-limit", limit, step=0)
+            self.assertTrue(gate.has_opened, level)
 
     def test_of_a_store_only_what_is_read_is_fetched(self):
         self.far("v3.zarr")

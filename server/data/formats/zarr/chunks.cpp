@@ -173,6 +173,16 @@ bool advance(std::vector<std::size_t>& place, const ChunkRange& range, std::size
   return false;
 }
 
+ChunkRange range_of(const std::vector<std::size_t>& shape, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count) {
+  ChunkRange out;
+  for (std::size_t d = 0; d < shape.size(); ++d) {
+    out.first.push_back(start[d] / shape[d]);
+    out.last.push_back((start[d] + count[d] - 1) / shape[d]);
+  }
+  return out;
+}
+
 std::uint64_t number_of_file(const ArrayMetadata& array, const std::vector<std::size_t>& file) {
   std::uint64_t out = 0;
   for (std::size_t d = 0; d < file.size(); ++d) out = out * files_along(array, d) + file[d];
@@ -235,6 +245,7 @@ void Store::forget_chunks(int variable) const {
   const std::lock_guard lock(mutex_);
   kept_.forget(variable);
   shards_.forget(variable);
+  std::erase_if(expected_, [variable](const auto& one) { return one.first.first == variable; });
 }
 
 Result<Store::File> Store::open_file(const Array& array, std::uint64_t number) const {
@@ -254,6 +265,15 @@ Error Store::fault(const std::string& path, const std::string& what) const {
 
 Result<const Store::OpenShard*> Store::shard_at(const Array& array, std::uint64_t number) const {
   if (OpenShard* const kept = shards_.find(number)) return reopened(array, number, *kept);
+  auto known = expected_.extract({variable_of(array), number});
+  auto shard = known ? std::move(known.mapped()) : open_shard(array, number);
+  if (!shard) return shard.error();
+  const std::size_t bytes = shard->index.size() * sizeof(Span) + open_file_bytes;
+  shards_.evict_for(bytes, kept_shards_bytes);
+  return shards_.add(number, std::move(*shard), bytes);
+}
+
+Result<Store::OpenShard> Store::open_shard(const Array& array, std::uint64_t number) const {
   auto file = open_file(array, number);
   if (!file) return file.error();
   OpenShard shard;
@@ -264,9 +284,7 @@ Result<const Store::OpenShard*> Store::shard_at(const Array& array, std::uint64_
     shard.index = std::move(*index);
     shard.identity = shard.file.input->identity();
   }
-  const std::size_t bytes = shard.index.size() * sizeof(Span) + open_file_bytes;
-  shards_.evict_for(bytes, kept_shards_bytes);
-  return shards_.add(number, std::move(shard), bytes);
+  return shard;
 }
 
 Result<const Store::OpenShard*> Store::reopened(const Array& array, std::uint64_t number,
@@ -286,8 +304,8 @@ Result<const Store::OpenShard*> Store::reopened(const Array& array, std::uint64_
 }
 
 // What is on disk of a file in parts may then be removed, where room is needed.
-void Store::close_parts(std::uint64_t number) const {
-  if (!shards_.has(number)) return;
+void Store::close_parts(int variable, std::uint64_t number) const {
+  if (!shards_.has(variable, number)) return;
   OpenShard& shard = *shards_.find(number);
   if (shard.file.input && shard.file.input->parts().number != 0) shard.file.input.reset();
 }
@@ -380,18 +398,12 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
     return {};
   }
   const ArrayMetadata& array = of.metadata;
-  const std::vector<std::size_t>& shape = array.file_shape();
   const std::size_t rank = start.size();
-  ChunkRange chunks;
-  ChunkRange files;
+  if (std::find(count.begin(), count.end(), 0) != count.end()) return {};
+  const ChunkRange chunks = range_of(array.chunks, start, count);
+  const ChunkRange files = range_of(array.file_shape(), start, count);
   std::size_t needed = array.chunk_items() * array.dtype.bytes + kept_.bookkeeping_bytes;
   for (std::size_t d = 0; d < rank; ++d) {
-    if (count[d] == 0) return {};
-    const std::size_t end = start[d] + count[d] - 1;
-    files.first.push_back(start[d] / shape[d]);
-    files.last.push_back(end / shape[d]);
-    chunks.first.push_back(start[d] / array.chunks[d]);
-    chunks.last.push_back(end / array.chunks[d]);
     const std::size_t along = chunks.last[d] - chunks.first[d] + 1;
     needed = needed > kept_bytes_most / along ? kept_bytes_most : needed * along;
   }
@@ -415,7 +427,7 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
       (*chunk)->unread_items -= std::min(items, (*chunk)->unread_items);
       if ((*chunk)->unread_items == 0) kept_.drop_newest();
     } while (advance(place, here, rank));
-    if (array.shard) close_parts(number_of_file(array, file));
+    if (array.shard) close_parts(variable, number_of_file(array, file));
   } while (advance(file, files, rank));
   return {};
 }

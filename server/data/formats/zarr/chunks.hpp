@@ -27,6 +27,10 @@ struct ChunkRange {
 // last place.
 bool advance(std::vector<std::size_t>& place, const ChunkRange& range, std::size_t dimensions);
 
+// Those of that shape in which a block lies; its counts are positive.
+ChunkRange range_of(const std::vector<std::size_t>& shape, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count);
+
 std::uint64_t number_of_file(const ArrayMetadata& array, const std::vector<std::size_t>& file);
 
 // Those of `chunks` that lie in a file.

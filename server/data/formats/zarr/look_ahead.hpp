@@ -14,6 +14,7 @@ namespace windsplat::data::zarr {
 struct Outlook {
   static constexpr std::uint64_t names = 32;
   static constexpr std::uint64_t shards = 8;
+  static constexpr std::size_t index_bytes_max = std::size_t{16} << 20;  // before a box is read
 
   // The next file along a range of files.
   struct Walk {

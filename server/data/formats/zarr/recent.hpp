@@ -30,7 +30,9 @@ class Recent {
     items_.splice(items_.begin(), items_, at->second);
     return &items_.front().item;
   }
-  [[nodiscard]] bool has(std::uint64_t number) const { return by_number_.contains(number); }
+  [[nodiscard]] bool has(int variable, std::uint64_t number) const {
+    return variable == variable_ && by_number_.contains(number);
+  }
   // Drops the item that find() or add() returned last.
   void drop_newest() {
     bytes_ -= items_.front().bytes;

@@ -49,6 +49,7 @@ class Store final : public cf::ArrayFile {
     return zarr_chunk_cost_bytes;
   }
   void forget_chunks(int variable) const override;
+  void expect(const std::vector<cf::Block>& blocks) const override;
   [[nodiscard]] cf::Unwritten unwritten(int variable, std::size_t most) const override;
 
   Result<void> read(int variable, const std::vector<std::size_t>& start,
@@ -69,6 +70,7 @@ class Store final : public cf::ArrayFile {
     File file;
     std::vector<Span> index;  // empty if the file is absent
     std::string identity;     // of a file in parts, which is closed once a block has its chunks
+    bool is_told = false;     // by expect(): all of its chunks that will be read
     [[nodiscard]] bool is_absent(std::size_t chunk) const {
       return index.empty() || index[chunk].bytes == absent_span;
     }
@@ -78,6 +80,9 @@ class Store final : public cf::ArrayFile {
       : files_(std::move(files)), contents_(std::move(contents)) {}
 
   [[nodiscard]] const Array& array_of(int variable) const;
+  [[nodiscard]] int variable_of(const Array& array) const {
+    return static_cast<int>(&array - contents_.arrays.data());
+  }
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;
@@ -87,13 +92,15 @@ class Store final : public cf::ArrayFile {
   // A chunk of a file, which is a shard if it has more than one.
   Result<ChunkBytes> load(const Array& array, std::uint64_t file_number, std::size_t in_file) const;
   Result<const OpenShard*> shard_at(const Array& array, std::uint64_t number) const;
+  Result<OpenShard> open_shard(const Array& array, std::uint64_t number) const;
   Result<File> open_file(const Array& array, std::uint64_t number) const;
   Result<const OpenShard*> reopened(const Array& array, std::uint64_t number,
                                     OpenShard& kept) const;
   // Tells of a store that is fetched what is read of the next files of a block.
   void look_ahead(const Array& array, Outlook& outlook) const;
-  void expect_chunks(const Array& array, std::uint64_t number, const ChunkRange& chunks) const;
-  void close_parts(std::uint64_t number) const;
+  void expect_file(const Array& array, std::uint64_t number) const;
+  void expect_chunks(const Array& array, const OpenShard& shard, const ChunkRange& chunks) const;
+  void close_parts(int variable, std::uint64_t number) const;
   [[nodiscard]] Error fault(const std::string& path, const std::string& what) const;
 
   std::shared_ptr<Files> files_;
@@ -101,6 +108,8 @@ class Store final : public cf::ArrayFile {
   mutable std::mutex mutex_;  // guards what is cached
   mutable Recent<Chunk> kept_;
   mutable Recent<OpenShard> shards_;
+  // By variable and number: those of expect() that are not read yet, at most Outlook::shards.
+  mutable std::map<std::pair<int, std::uint64_t>, OpenShard> expected_;
 };
 
 // The arrays that the attribute of a store with levels names, and the coordinates of level 0.

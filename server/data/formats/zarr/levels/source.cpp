@@ -75,6 +75,9 @@ class LevelSource final : public FileSource {
     const Shape start{step, at(box.first[2]), at(box.first[1]), at(box.first[0])};
     const Shape count{1, at(box.count[2]), at(box.count[1]), at(box.count[0])};
     const std::vector<int>& arrays = found->second;
+    std::vector<cf::Block> blocks;
+    for (const int array : arrays) blocks.push_back({array, start, count});
+    store_->arrays->expect(blocks);
     for (std::size_t c = 0; c < arrays.size(); ++c) {
       float* const values = out + c * box.samples();
       auto done = store_->arrays->read(arrays[c], start, count, values);
