@@ -129,7 +129,7 @@ bool Ahead::has_room(std::uint64_t bytes) const {
 }
 
 bool Ahead::may_open(const Opening& one) const {
-  return !one.is_under_way && (one.what.in_parts || !are_large_) &&
+  return !one.is_under_way && (one.what.in_parts || !unread_.is_large) &&
          has_room(fetcher_.ahead_limits().file_bytes_max);
 }
 
@@ -221,7 +221,7 @@ void Ahead::finish(const OpeningPtr& one, Result<FetchedFile> file) {
   } else if (file && ::fstat(file->file.number(), &status) == 0) {
     one->bytes = static_cast<std::uint64_t>(status.st_size);
   } else if (!file && file.error().kind == ErrorKind::too_large) {
-    are_large_ = true;
+    unread_.is_large = true;
   }
   one->file = std::move(file);
 }

@@ -69,6 +69,7 @@ class Ahead {
   struct Unread {
     std::list<Piece> pieces;  // under way, or fetched and not read
     std::uint64_t bytes = 0;  // of them
+    bool is_large = false;    // whole files are too large, and left to the reader from now on
   };
   struct Worker {
     std::thread thread;
@@ -100,7 +101,6 @@ class Ahead {
   std::list<OpeningPtr> openings_;  // waiting, under way, or not taken yet
   std::deque<Piece> pieces_;        // waiting
   Unread unread_;
-  bool are_large_ = false;  // the files fetched as a whole, which are left to the reader
 };
 
 }  // namespace windsplat::data::fetch
