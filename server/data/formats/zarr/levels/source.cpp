@@ -76,6 +76,7 @@ class LevelSource final : public FileSource {
     const Shape count{1, at(box.count[2]), at(box.count[1]), at(box.count[0])};
     const std::vector<int>& arrays = found->second;
     std::vector<cf::Block> blocks;
+    blocks.reserve(arrays.size());
     for (const int array : arrays) blocks.push_back({array, start, count});
     store_->arrays->expect(blocks);
     for (std::size_t c = 0; c < arrays.size(); ++c) {
