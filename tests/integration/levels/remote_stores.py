@@ -142,6 +142,11 @@ class RemoteStores(unittest.TestCase):
         all_bytes = sum(len(body) for name, body in self.host.files.items()
                         if name.startswith("v3.zarr/"))
         self.assertLess(sum(count for _, _, count in self.host.parts), all_bytes / 2)
+        shards = [path for path in self.host.asked() if "/a/c/" in path]
+        parts = [path for path, _, _ in self.host.parts if "/a/c/" in path]
+        self.assertGreater(len(parts), 0)
+        self.assertEqual(sorted(shards), sorted(parts), "no shard is sent as a whole")
+        self.assertEqual(len(set(shards)), 1, "of one step")
 
     def test_a_small_cache_holds_what_is_fetched_until_it_is_read(self):
         near = self.picture(self.folder / "v3.zarr")
