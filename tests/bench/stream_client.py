@@ -17,22 +17,32 @@ class Viewer(WebSocket):
     def __init__(self, port, receive_buffer=0):
         super().__init__(Target("127.0.0.1", port), 120, receive_buffer)
         self.final_bytes = {}  # payload size of the newest final frame, by seq
+        self.payload_bytes = 0  # of the newest frame
+
+    def received(self):
+        """A message, or a frame, which is acknowledged: (message, None, None, None), or None, its
+        number, its revision and whether it is final. The size of its payload is kept."""
+        opcode, payload = self.message()
+        if opcode == TEXT:
+            message = json.loads(payload)
+            if message["type"] == "error":
+                raise RuntimeError(message)
+            return message, None, None, None
+        seq, rev, _, flags = struct.unpack_from("<4I", payload, 8)
+        self.payload_bytes = len(payload) - 64
+        self.say({"type": "ack", "seq": seq, "decodeMs": 1})
+        return None, seq, rev, bool(flags & FINAL)
 
     def final_frame(self, rev):
         """Receives frames until the final one of that revision; returns its payload size."""
         while True:
-            opcode, payload = self.message()
-            if opcode == TEXT:
-                message = json.loads(payload)
-                if message["type"] == "error":
-                    raise RuntimeError(message)
+            message, seq, frame_rev, final = self.received()
+            if message:
                 if message["type"] == "unchanged" and message["rev"] == rev:
                     return self.final_bytes[message["seq"]]
                 continue
-            seq, frame_rev, _, flags = struct.unpack_from("<4I", payload, 8)
-            self.say({"type": "ack", "seq": seq, "decodeMs": 1})
-            if flags & FINAL:
-                self.final_bytes = {seq: len(payload) - 64}
+            if final:
+                self.final_bytes = {seq: self.payload_bytes}
                 if frame_rev == rev:
                     return self.final_bytes[seq]
 

@@ -16,7 +16,6 @@ import json
 import math
 import os
 import pathlib
-import struct
 import subprocess
 import sys
 import tempfile
@@ -25,7 +24,7 @@ import urllib.request
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from process_memory import PeakPss, bytes_of  # noqa: E402
-from stream_client import FINAL, TEXT, Daemon, Viewer  # noqa: E402
+from stream_client import Daemon, Viewer  # noqa: E402
 
 MIB = 1 << 20
 
@@ -96,19 +95,14 @@ class Measured(Viewer):
     def next_frame(self, final=False):
         """The next frame of the newest revision: whether it is final, and its report."""
         while True:
-            opcode, payload = self.message()
-            if opcode == TEXT:
-                message = json.loads(payload)
-                if message["type"] == "error":
-                    raise RuntimeError(message)
+            message, seq, rev, is_final = self.received()
+            if message:
                 if message["type"] == "chosen":
                     self.reports[message["seq"]] = message
                 continue
-            seq, rev, _, flags = struct.unpack_from("<4I", payload, 8)
-            self.say({"type": "ack", "seq": seq, "decodeMs": 1})
             report = self.reports.pop(seq)
-            if rev == self.rev and (flags & FINAL or not final):
-                return bool(flags & FINAL), report
+            if rev == self.rev and (is_final or not final):
+                return is_final, report
 
 
 def told(error):
