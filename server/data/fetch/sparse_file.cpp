@@ -184,7 +184,7 @@ Result<SparseFile::FlightPtr> SparseFile::begin_flight(std::size_t first, std::s
   return flight;
 }
 
-// Sends its request; the flight lands whatever happens, so that nobody waits for ever.
+// Sends its request; the flight ends in any case, so that no reader waits for it without end.
 Result<void> SparseFile::fetch_blocks(std::size_t first, const FlightPtr& flight, const Get& get) {
   Result<void> done = make_error(ErrorKind::cancelled, in_quotes(url_) + " was not received");
   try {
