@@ -62,10 +62,10 @@ class MemoryFiles : public Files {
     const int descriptor =
         on_disk_ ? ::open(name_on_disk().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)
                  : ::memfd_create("input", MFD_CLOEXEC);
-    expect(descriptor >= 0, "a file to be read");
+    fuzz::expect(descriptor >= 0, "a file to be read");
     const std::string_view bytes = found->second;
-    expect(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
-           "a file contains its bytes");
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    fuzz::expect(written == static_cast<ssize_t>(bytes.size()), "a file contains its bytes");
     count_opened(name, bytes.size());
     return InputFile::adopt(descriptor, name.substr(name.find_last_of('/') + 1));
   }
