@@ -163,6 +163,8 @@ export function sharedDaemon({ basePath = "/", args, page: usual = {} } = {}) {
       if (!faulty) assert.deepEqual(page.faults, [], "no errors in the browser's console");
       return result;
     } finally {
+      // A route that still waits for its answer must not outlive the page.
+      await page.unrouteAll({ behavior: "ignoreErrors" });
       await page.context().close();
     }
   }
