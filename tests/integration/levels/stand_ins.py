@@ -109,7 +109,7 @@ class StandIns(unittest.TestCase):
         session.frame_of(session.patch(VIEW), final=True)
         session.frame_of(session.patch({"camera": looking_at(-0.8001, -0.4)}), final=True)
         before = None
-        while before != (reads := self.reads()):
+        while before != (reads := self.reads()) or self.daemon.metric("windsplat_bricks_waiting"):
             before = reads
             time.sleep(1)
 
