@@ -213,6 +213,33 @@ test("a preset that the server does not draw is not offered", () =>
     },
   ));
 
+test("a preset that the server has no memory for does not keep others from being drawn", () => {
+  const refused = [];
+  return withPage(
+    async (page) => {
+      const others = page.locator(".preset:visible", { hasNotText: /^Globe$/ }).locator("img");
+      await page.waitForFunction(
+        () =>
+          [...document.querySelectorAll(".preset img")].filter((one) => one.naturalWidth > 0)
+            .length ===
+          document.querySelectorAll(".preset").length - 1,
+      );
+      assert.ok((await others.count()) >= 8);
+      assert.ok(await preset(page, /^Globe$/).isVisible(), "it is asked for again");
+      assert.ok(refused.length >= 1 && refused.length <= 5, `${refused.length}`);
+    },
+    {
+      faulty: true, // the browser logs the refusals
+      prepare: (page) =>
+        page.route("**/v1/frames", (route) => {
+          if (!route.request().postData().includes('"sphere"')) return route.continue();
+          refused.push(route.request().url());
+          return route.fulfill({ status: 507, json: { title: "no", status: 507, detail: "no" } });
+        }),
+    },
+  );
+});
+
 // --- light and surfaces -------------------------------------------------------------------------
 
 const lightOf = (page) =>

@@ -135,16 +135,20 @@ class PresetPictures {
   private async load(): Promise<void> {
     const request = new AbortController();
     this.request = request;
+    const failed = this.tries;
     for (const tile of this.tiles) {
       const key = this.keyOf(tile);
       if (this.refused.has(key) || this.kit.pictures.find(key) !== undefined) continue;
       const goesOn = await this.draw(tile, key, request.signal);
       if (!goesOn || request.signal.aborted || !this.element.isConnected) break;
     }
-    if (this.request === request) this.request = null;
+    if (this.request !== request) return;
+    this.request = null;
+    if (this.tries > failed) this.startSoon(busyMs);
   }
 
-  // Returns whether the server can be asked for the next picture.
+  // Returns whether the server can be asked for the next picture: also where it has no memory for
+  // this one.
   private async draw(tile: Tile, key: string, signal: AbortSignal): Promise<boolean> {
     const { api } = this.kit.host;
     try {
@@ -155,8 +159,7 @@ class PresetPictures {
       else {
         this.tries += 1;
         for (const one of this.tiles) this.show(one);
-        this.startSoon(busyMs);
-        return false;
+        return failure instanceof ProblemError && failure.status === 507;
       }
     }
     this.show(tile);
