@@ -165,9 +165,10 @@ std::array<float, 2> range_of(const Subject& subject, const std::string& name,
                               const data::Volume& held) {
   const scene::Scene& scene = subject.scene;
   const data::FieldInfo* const field = subject.info.find(name);
-  if (!scene.lattice.part || scene.level != std::array{0, 0, 0} || field == nullptr) {
-    return held.range;
-  }
+  const bool middles =
+      scene.vector && scene.vector->field.get() == &held && scene.vector->field_stride > 1;
+  const bool all = !scene.lattice.part && !middles;
+  if (all || scene.level != std::array{0, 0, 0} || field == nullptr) return held.range;
   const auto index = static_cast<std::size_t>(field - subject.info.fields.data());
   const auto step = static_cast<std::size_t>(subject.completed.view().step);
   const auto* const stored = data::stored_range(subject.info, index, step);

@@ -54,15 +54,16 @@ kernels::Camera make_camera(const Scene& scene) {
   return to;
 }
 
-void check_volume(const data::Volume& volume, const Lattice& lattice) {
-  WINDSPLAT_CHECK(volume.dims == lattice.held().count);
+// stride: scene::VectorLayer::field_stride.
+void check_volume(const data::Volume& volume, const Lattice& lattice, int stride = 1) {
+  WINDSPLAT_CHECK(volume.dims == data::strided_box(lattice.held(), stride).count);
   WINDSPLAT_CHECK(volume.values.size() ==
                   volume.samples() * static_cast<std::size_t>(volume.components));
 }
 
 void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   const scene::VectorLayer& from = *pass.vector;
-  check_volume(*from.field, scene.lattice);
+  check_volume(*from.field, scene.lattice, from.field_stride);
   kernels::LineStyle& to = pass.kernel.line;
   for (int c = 0; c < 3; ++c) {
     to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
@@ -252,17 +253,31 @@ void place_positions(const Scene& scene, int major, const SampleWays& ways, Pass
   if (scene.lattice.places) bend_pass(scene, ways, pass);
 }
 
+// Of fields that hold the middles of kernels alone, which are those of the pass.
+void index_middles(const Scene& scene, PassPlan& pass) {
+  WINDSPLAT_CHECK(pass.vector->field_stride == pass.stride && pass.scalars.empty());
+  WINDSPLAT_CHECK(!scene.lattice.places && !scene.slice && !scene.light);
+  WINDSPLAT_CHECK(pass.vector->color_by != scene::LineColor::scalar);
+  for (AxisArrays& axis : pass.axis) {
+    for (const int sample : axis.sample) axis.field_index.push_back(sample / pass.stride);
+  }
+}
+
 void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,
                  PassPlan& pass) {
   const trace::Segments* const segments =
       pass.vector != nullptr ? pass.vector->streamlets.get() : nullptr;
   const auto& dims = segments != nullptr ? segments->dims : scene.lattice.dims;
-  const data::Box held = segments != nullptr ? data::whole_box(dims) : scene.lattice.held();
+  const bool middles = pass.vector != nullptr && pass.vector->field_stride > 1;
+  const data::Box held = segments != nullptr ? data::whole_box(dims)
+                         : middles           ? data::strided_box(scene.lattice.held(), pass.stride)
+                                             : scene.lattice.held();
   kernels::Pass& to = pass.kernel;
   if (segments != nullptr) {
     place_chains(*segments, pass);
   } else {
     place_positions(scene, major, ways, pass);
+    if (middles) index_middles(scene, pass);
   }
   to.step[0] = 1;
   to.step[1] = held.count[0];
@@ -278,6 +293,7 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
                   axis.cell.data(),
                   axis.inverse_cell.data(),
                   axis.sample.data(),
+                  middles ? axis.field_index.data() : axis.sample.data(),
                   axis.group.data(),
                   axis.visit.data()};
     to.dims[a] = dims[a];

@@ -44,6 +44,7 @@ struct AxisArrays {
   std::vector<float> cell;
   std::vector<float> inverse_cell;
   std::vector<int> sample;
+  std::vector<int> field_index;  // empty: that of the sample
   std::vector<int> group;
   std::vector<int> visit;
   std::vector<std::array<int, 2>> bricks;  // first and count of each brick in `visit`

@@ -156,7 +156,7 @@ class Sampling {
     const scene::VectorLayer& layer = *scene_.vector;
     std::array<double, 3> v{};
     for (int c = 0; c < layer.field->components; ++c) {
-      v[static_cast<std::size_t>(c)] = layer.field->component(c)[samples_.number(i)];
+      v[static_cast<std::size_t>(c)] = layer.field->component(c)[samples_.vector_number(i)];
     }
     const double magnitude = std::hypot(v[0], v[1], v[2]);
     out.drawn = magnitude > 0 && magnitude >= layer.min_magnitude;

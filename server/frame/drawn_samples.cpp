@@ -23,6 +23,10 @@ DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene) {
 
 std::size_t DrawnSamples::number(const Index& i) const { return scene_.lattice.number_of(i); }
 
+std::size_t DrawnSamples::vector_number(const Index& i) const {
+  return scene_.lattice.number_of(i, scene_.vector->field_stride);
+}
+
 glm::dvec3 DrawnSamples::place(const Index& i) const {
   const scene::Lattice& lattice = scene_.lattice;
   if (lattice.places) {

@@ -64,7 +64,9 @@ class DrawnSamples {
   [[nodiscard]] const Index& high() const { return high_; }
   [[nodiscard]] bool contains(const Index& i) const;
   [[nodiscard]] std::size_t number(const Index& i) const;  // in a field
-  [[nodiscard]] glm::dvec3 place(const Index& i) const;    // world units
+  // In that of the vectors; where it holds the middles of kernels alone, of the sample's kernel.
+  [[nodiscard]] std::size_t vector_number(const Index& i) const;
+  [[nodiscard]] glm::dvec3 place(const Index& i) const;  // world units
   [[nodiscard]] std::optional<Index> neighbour(const Index& i, std::size_t a, int step) const;
   // The sample of the next line along an axis, from that of a line; at the end of the axis of the
   // one before.

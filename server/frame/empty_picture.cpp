@@ -132,9 +132,12 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
       all.push_back(std::move(reason));
     }
   };
-  // What is held of a part explains nothing of the whole.
+  // What is held of a part explains nothing of the whole, nor do the middles of kernels.
   const bool part = scene.lattice.part.has_value();
-  if (scene.vector) add(part ? "" : why_no_lines(*scene.vector, view, scene.slice));
+  if (scene.vector) {
+    const bool all = !part && scene.vector->field_stride == 1;
+    add(all ? why_no_lines(*scene.vector, view, scene.slice) : "");
+  }
   auto layer = scene.scalars.begin();
   for (std::size_t i = 0; i < view.scalars->size() && layer != scene.scalars.end(); ++i) {
     const protocol::ScalarView& scalar = (*view.scalars)[i];

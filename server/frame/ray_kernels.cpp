@@ -234,7 +234,8 @@ Medium RayKernels::medium(const Group& group, const Index& i) const {
 
 double RayKernels::half_line(const Group& group, const Index& i) const {
   const scene::VectorLayer& layer = *group.lines;
-  const double magnitude = magnitude_of(*layer.field, samples_.number(sample_of(*group.layers, i)));
+  const std::size_t number = samples_.vector_number(sample_of(*group.layers, i));
+  const double magnitude = magnitude_of(*layer.field, number);
   if (!(magnitude > 0) || magnitude < layer.min_magnitude) return 0;
   const double full = layer.magnitude_range[1];
   return 0.5 * layer.length * (full > 0 ? std::min(1.0, magnitude / full) : 1);
@@ -402,8 +403,8 @@ void RayKernels::add(const Group& group, const Index& i, const Place& place, dou
   RayKernel kernel;
   if (half > 0) kernel.line = reference::make_ribbon(scene_, view_, *group.lines, at);
   if (kernel.line) {
-    const std::size_t sample = samples_.number(sample_of(*group.layers, i));
-    kernel.weak = magnitude_of(*group.lines->field, sample) < marked_.magnitude;
+    const std::size_t number = samples_.vector_number(sample_of(*group.layers, i));
+    kernel.weak = magnitude_of(*group.lines->field, number) < marked_.magnitude;
     kernel.box = reference::ribbon_box(*kernel.line);
     const bool aside = kernel.box.x0 > bundle.high[0] || kernel.box.x1 < bundle.low[0] ||
                        kernel.box.y0 > bundle.high[1] || kernel.box.y1 < bundle.low[1];

@@ -119,11 +119,11 @@ struct Fields {
   std::optional<data::Box> box;  // of samples of the level; nullopt: all
   const Section* section;        // null: the samples of the data
   [[nodiscard]] Needed of_medium(const std::string& name) const {
-    return find(name, coarsening, kept_of(name, protocol::FilterOf::media));
+    return find({name, coarsening}, kept_of(name, protocol::FilterOf::media));
   }
-  [[nodiscard]] Needed of_lines(const std::string& name) const {
-    return find(name, drawn(coarsening, completed.view()),
-                kept_of(name, protocol::FilterOf::lines));
+  // Of the lines, or what colours them.
+  [[nodiscard]] Needed of_lines(const ShownField& shown) const {
+    return find(shown, kept_of(shown.field, protocol::FilterOf::lines));
   }
   // Samples of the data without those that the region leaves out.
   [[nodiscard]] data::Derivation kept_of(const std::string& name, protocol::FilterOf of) const {
@@ -135,9 +135,9 @@ struct Fields {
   [[nodiscard]] std::size_t components_of(const std::string& name) const {
     return dataset.info().find(name)->components.size();
   }
-  [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how,
-                            const data::Derivation& kept) const {
-    if (box) return {name, part_of_field(dataset, name, how, *box).value()};
+  [[nodiscard]] Needed find(const ShownField& shown, const data::Derivation& kept) const {
+    const auto& [name, how, middles] = shown;
+    if (box) return {name, part_of_field(dataset, shown, *box).value()};
     if (section == nullptr) {
       // What a region keeps is not what is stored.
       auto stored = kept.variant.empty() ? dataset.stored_reduction(name, how) : std::nullopt;
@@ -215,13 +215,18 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   if (has_seeds(view)) layer.min_magnitude = 0;  // chosen lines have no gaps
   layer.combine_or = from.combine == protocol::LineCombination::either &&
                      (view.geometry.slice || view.geometry.plane);
-  if (layer.color_by == LineColor::scalar) lines.colors = fields.of_lines(*from.color.field);
+  if (layer.color_by == LineColor::scalar) {
+    lines.colors = fields.of_lines({*from.color.field, drawn(fields.coarsening, view)});
+  }
   if (view.geometry.plane) {
     const auto kept = fields.kept_of(from.field.name, protocol::FilterOf::lines);
     set_plane(*fields.section, from.field.name, kept, *factors, lines);
   } else {
     set_factors(*factors, fields, layer);
-    lines.vectors = fields.of_lines(from.field.name);
+    const ShownField shown =
+        lines_at(view, fields.coarsening, fields.completed.lattice(), fields.dataset);
+    if (shown.middles) layer.field_stride = layer.stride;
+    lines.vectors = fields.of_lines(shown);
   }
   return lines;
 }

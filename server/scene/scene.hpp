@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/data/model/box.hpp"
+#include "server/data/model/middles.hpp"
 #include "server/data/model/volume.hpp"
 #include "server/ground/paint.hpp"
 #include "server/surface/shown.hpp"
@@ -69,19 +70,19 @@ struct Lattice {
   // describes the whole lattice, so that a picture does not depend on the part. nullopt: all.
   std::optional<data::Box> part;
   [[nodiscard]] data::Box held() const { return part ? *part : data::whole_box(dims); }
-  // Number of a sample in the fields, x fastest.
-  [[nodiscard]] std::size_t number_of(const std::array<int, 3>& sample) const;
+  // Number of a sample in the fields, x fastest. stride: of fields that hold the middles of kernels
+  // alone (VectorLayer::field_stride), the number of the kernel that the sample belongs to.
+  [[nodiscard]] std::size_t number_of(const std::array<int, 3>& sample, int stride = 1) const;
   // Number of samples along an axis that are drawn, unless it is that of a slice.
   [[nodiscard]] int drawn(int axis) const { return axis == 0 && around > 0 ? around : dims[axis]; }
 };
 
-inline std::size_t Lattice::number_of(const std::array<int, 3>& sample) const {
-  const std::array<int, 3>& count = part ? part->count : dims;
+inline std::size_t Lattice::number_of(const std::array<int, 3>& sample, int stride) const {
+  const data::Box kernels = data::strided_box(held(), stride);
   std::size_t number = 0;
   for (std::size_t a = 3; a-- > 0;) {
-    const int first_held = part ? part->first[a] : 0;
-    number = number * static_cast<std::size_t>(count[a]) +
-             static_cast<std::size_t>(sample[a] - first_held);
+    number = number * static_cast<std::size_t>(kernels.count[a]) +
+             static_cast<std::size_t>(sample[a] / stride - kernels.first[a]);
   }
   return number;
 }
@@ -138,6 +139,11 @@ inline double outer_radius(const LineMark& mark, double r1, double r2) {
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
+  // At full detail the field may hold the middles of kernels alone (data::strided_sample()): then
+  // it is `stride`, otherwise 1. Everything else describes all samples. Only of straight lines of a
+  // rectilinear lattice without a slice and light, whose stride no medium has, and which no other
+  // field colours.
+  int field_stride = 1;
   // Curved lines in place of straight ones, of all kernel positions; null: straight lines. Their
   // values of colour lie in the range of `color`, scaled like their magnitudes by a power of two.
   std::shared_ptr<const trace::Segments> streamlets;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/base/error.hpp"
+#include "server/data/model/middles.hpp"
 
 namespace windsplat::data {
 
@@ -181,11 +182,15 @@ int components_of(const FieldInfo& field, StoredAs as) {
 
 std::optional<StoredPart> stored_level(const DatasetInfo& info, std::size_t field,
                                        const Coarsening& how) {
+  if (info.stored == nullptr || how.halvings == full) return std::nullopt;
+  const bool drawn = how.reduction == Reduction::drawn;
+  if (drawn && how.stride > 1 && how.halvings == middles_of(how.stride).halvings) {
+    return stored_middles(info, field, how.stride);
+  }
   const auto level = level_of(info, how.halvings);
-  if (!level || *level == 0) return std::nullopt;
+  if (!level) return std::nullopt;
   StoredPart part;
   part.level = *level;
-  const bool drawn = how.reduction == Reduction::drawn;
   part.as = drawn ? StoredAs::drawn : StoredAs::two_values;
   const auto dims = stored_dims(info, field, part.level, part.as);
   if (!dims) return std::nullopt;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/data/model/digest.hpp"
+#include "server/data/model/middles.hpp"
 #include "server/data/resident/dataset_state.hpp"
 
 namespace windsplat::data {
@@ -115,18 +116,14 @@ std::optional<Derivation> Dataset::stored_reduction(const std::string& field,
   if (!index || minus_ || how.halvings == std::array{0, 0, 0}) return std::nullopt;
   Derivation out = reduction(field, how);
   if (const auto level = stored_level(info, *index, how)) {
+    out.variant = level_variant(level->level) + digest_of(data::key_of(how));
     out.make = nullptr;
     out.stored = level;
     return out;
   }
   if (how.reduction != Reduction::drawn) return std::nullopt;
-  const auto middles = stored_middles(info, *index, how.stride);
-  if (!middles) return std::nullopt;
-  Derivation from;
-  from.variant = level_variant(middles->level) + "strided";
-  from.bytes = bytes_beside_level(field, how);
-  from.stored = middles;
-  out.from = std::make_shared<const Derivation>(std::move(from));
+  if (!stored_middles(info, *index, how.stride)) return std::nullopt;
+  out.from = std::make_shared<const Derivation>(*stored_reduction(field, middles_of(how.stride)));
   out.make = [state = state_, how, dims = info.grid.dims()](const Volume& strided) {
     state->add(&Counts::levels);
     return draw(strided, how, dims);
@@ -163,6 +160,11 @@ bool Dataset::fits_in_full(const std::vector<std::string>& fields) const {
   const std::set<std::string> counted(fields.begin(), fields.end());
   std::uint64_t bytes = 0;
   for (const std::string& field : counted) bytes += loading_bytes(field);
+  return fits_beside_loader(bytes, fields);
+}
+
+bool Dataset::fits_beside_loader(std::uint64_t bytes,
+                                 const std::vector<std::string>& fields) const {
   if (state_->info.stored == nullptr) return is_within_limit(bytes);
   return bytes + state_->bytes_beside(reading_bytes_of_store(state_->info, fields)) <=
          state_->budget->bytes_max();

@@ -107,6 +107,9 @@ class Dataset {
   // Whether the fields at full detail fit into the memory limit together, beside a loader that
   // reads them.
   [[nodiscard]] bool fits_in_full(const std::vector<std::string>& fields) const;
+  // Whether that much fits into the memory limit beside a loader that reads the fields.
+  [[nodiscard]] bool fits_beside_loader(std::uint64_t bytes,
+                                        const std::vector<std::string>& fields) const;
   // Whether that much fits into the memory limit beside a loader that reads boxes of the fields.
   [[nodiscard]] bool fits_beside_boxes(std::uint64_t bytes,
                                        const std::vector<std::string>& fields) const;

@@ -397,10 +397,11 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& v = pass.axis[pass.v];
   const Axis& major = pass.axis[pass.major];
   const std::int64_t sheet =
-      pass.origin + pass.step[pass.major] * major.sample[major.visit[brick.sheet]];
-  const std::int64_t first = sheet + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
+      pass.origin + pass.step[pass.major] * major.field_index[major.visit[brick.sheet]];
+  const std::int64_t first =
+      sheet + pass.step[pass.u] * u.field_index[lowest(u.visit + brick.u_first)];
   for (int j = 0; j < brick.v_count; ++j) {
-    const std::int64_t at = first + pass.step[pass.v] * v.sample[v.visit[brick.v_first + j]];
+    const std::int64_t at = first + pass.step[pass.v] * v.field_index[v.visit[brick.v_first + j]];
     if (brick.lines != 0) {
       for (const float* values : pass.line.velocity) {
         if (values != nullptr) prefetch_row(values + at, brick.u_count);

@@ -90,8 +90,10 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
     for (int c = 0; c < 3; ++c) rows.across[c][i] = camera[at + c];
   }
   const std::int64_t step = pass.step[pass.u];
-  const std::int32_t* sample = rows.sample[pass.u];
-  for (int i = 0; i < brick_side; ++i) rows.along_u[i] = step * (sample[i] - sample[0]);
+  const int* index = u.field_index + first;
+  for (int i = 0; i < brick_side; ++i) {
+    rows.along_u[i] = step * (index[i < count ? i : count - 1] - index[0]);
+  }
   const bool full = count == brick_side;
   rows.consecutive = full && rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
@@ -106,11 +108,13 @@ void set_pair(const Pass& pass, int pair, Rows& rows) {
   fill_row<0>(pass, pass.v, rows.first[pass.v] + 2 * pair, rows);
   fill_row<brick_side>(pass, pass.v, rows.first[pass.v] + second, rows);
   rows.there = second - 2 * pair + 1;
-  rows.offset[0] = rows.offset[1] = pass.origin;
-  for (int a = 0; a < 3; ++a) {
-    rows.offset[0] += pass.step[a] * rows.sample[a][0];
-    rows.offset[1] += pass.step[a] * rows.sample[a][brick_side];
-  }
+  const auto along = [&](int a, int index) {
+    return pass.step[a] * pass.axis[a].field_index[index];
+  };
+  const std::int64_t first =
+      pass.origin + along(pass.major, rows.first[pass.major]) + along(pass.u, rows.first[pass.u]);
+  rows.offset[0] = first + along(pass.v, rows.first[pass.v] + 2 * pair);
+  rows.offset[1] = first + along(pass.v, rows.first[pass.v] + second);
 }
 
 // Offset of the i-th sample of a pair in the fields.

@@ -41,9 +41,11 @@ struct Axis {
   const float* position;  // world coordinate
   const float* cell;      // stride times spacing, world units
   const float* inverse_cell;
-  const int* sample;  // index of its sample in the field
-  const int* group;   // number of samples that it represents
-  const int* visit;   // positions in visibility order: bricks outward from the cell of the eye
+  const int* sample;  // index of its sample in the lattice
+  // The same in the fields: of those that hold the middles of kernels alone, that of the kernel.
+  const int* field_index;
+  const int* group;  // number of samples that it represents
+  const int* visit;  // positions in visibility order: bricks outward from the cell of the eye
 };
 
 constexpr int color_floats = 4;
@@ -200,8 +202,8 @@ struct Body {
 struct Pass {
   Axis axis[3];
   int major, u, v;       // sheets are stacked along major; u is innermost
-  std::int64_t step[3];  // offset between neighbours along each axis, in samples
-  std::int64_t origin;   // offset of sample 0 in the fields: not above 0, as they may be of a part
+  std::int64_t step[3];  // offset between neighbours along each axis of the fields, in samples
+  std::int64_t origin;   // offset of index 0 in the fields: not above 0, as they may be of a part
   int has_lines;
   int has_medium;
   LineStyle line;

@@ -12,6 +12,7 @@ void clear(AxisArrays& axis) {
   axis.cell.clear();
   axis.inverse_cell.clear();
   axis.sample.clear();
+  axis.field_index.clear();
   axis.group.clear();
   axis.visit.clear();
   axis.bricks.clear();

@@ -53,8 +53,11 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& layer,
                                        const KernelPosition& position) {
   Vec data{};
+  const std::size_t number = layer.field_stride == 1
+                                 ? position.index
+                                 : scene.lattice.number_of(position.sample, layer.field_stride);
   for (int c = 0; c < layer.field->components; ++c) {
-    data[c] = static_cast<double>(layer.field->component(c)[position.index]);
+    data[c] = static_cast<double>(layer.field->component(c)[number]);
   }
   if (std::isnan(data[0])) return {};
   DrawnVector drawn;

@@ -189,7 +189,9 @@ class PixelLight {
     const auto hit = reference::hit_ribbon(*line, ray_.x, ray_.y);
     if (hit.opacity <= 0) return;
     one.at = {0.5 * (line->x0 + line->x1), 0.5 * (line->y0 + line->y1)};
-    one.value = magnitude_at(*one.group->lines->field, one.index);
+    const scene::VectorLayer& layer = *one.group->lines;
+    one.value =
+        magnitude_at(*layer.field, scene_.lattice.number_of(one.sample, layer.field_stride));
     keep_line(hit, one);
   }
 

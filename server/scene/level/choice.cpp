@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "protocol/view/shown.hpp"
+#include "server/data/model/middles.hpp"
 #include "server/data/model/stored.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/lines/mark.hpp"
@@ -50,10 +51,42 @@ MergeLimits merge_limits(const View& view) {
   return limits;
 }
 
-std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how) {
+namespace {
+
+// Whether lines at full detail need nothing of their field but the middles of their kernels, and
+// these are stored. Layers of one stride, light and colours have the indices of the vectors.
+bool may_use_middles(const View& view, const Lattice& lattice, const data::Dataset& dataset) {
+  if (!has_strided_lines(view) || view.light || !may_use_stored(view, lattice, dataset)) {
+    return false;
+  }
+  const auto& media = *view.scalars;
+  const bool shared = std::any_of(media.begin(), media.end(), [&](const auto& of) {
+    return absorbs(of) && of.stride == view.vector.stride;
+  });
+  if (shared || view.vector.color.by == protocol::ColorBy::scalar) return false;
+  const data::DatasetInfo& info = dataset.info();
+  const data::FieldInfo* const field = info.find(view.vector.field.name);
+  if (field == nullptr) return false;
+  const auto index = static_cast<std::size_t>(field - info.fields.data());
+  return data::stored_middles(info, index, *view.vector.stride).has_value();
+}
+
+}  // namespace
+
+ShownField lines_at(const View& view, const data::Coarsening& how, const Lattice& lattice,
+                    const data::Dataset& dataset) {
+  ShownField lines{view.vector.field.name, drawn(how, view)};
+  if (how.halvings == std::array{0, 0, 0} && may_use_middles(view, lattice, dataset)) {
+    return {lines.field, data::middles_of(lines.coarsening.stride), true};
+  }
+  return lines;
+}
+
+std::vector<ShownField> shown_at(const View& view, const data::Coarsening& how,
+                                 const Lattice& lattice, const data::Dataset& dataset) {
   std::vector<ShownField> shown;
   if (shows_lines(view)) {
-    shown.push_back({view.vector.field.name, drawn(how, view)});
+    shown.push_back(lines_at(view, how, lattice, dataset));
     if (view.vector.color.by == protocol::ColorBy::scalar) {
       shown.push_back({view.vector.color.field.value(), drawn(how, view)});
     }
@@ -77,7 +110,7 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
   std::uint64_t largest = 0;
-  for (const auto& [field, how] : shown) {
+  for (const auto& [field, how, middles] : shown) {
     if (!counted.emplace(field, how.reduction).second) continue;
     const std::size_t components = dataset.info().find(field)->components.size();
     levels += level_bytes(lattice, components, how);
@@ -90,12 +123,16 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
   return dataset.is_within_limit(levels + largest + reading);
 }
 
-// Whether every sample of all fields fits into memory.
+// Whether what is drawn of all fields at full detail fits into memory.
 bool fits_in_full(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
-  std::vector<std::string> fields;
-  fields.reserve(shown.size());
-  for (const ShownField& one : shown) fields.push_back(one.field);
-  return dataset.fits_in_full(fields);
+  std::set<std::string> counted;
+  std::uint64_t bytes = 0;
+  for (const ShownField& one : shown) {
+    if (!counted.insert(one.field).second) continue;
+    bytes += one.middles ? dataset.level_bytes(one.field, one.coarsening)
+                         : dataset.loading_bytes(one.field);
+  }
+  return dataset.fits_beside_loader(bytes, {counted.begin(), counted.end()});
 }
 
 }  // namespace
@@ -139,7 +176,7 @@ class Choice {
     }
     const DrawnPart all{full, std::nullopt, level};
     if (!may_use_stored(view_, lattice_, dataset_)) return all;
-    if (fits_in_full(shown_at(view_, coarsening_of(lattice_, full)), dataset_)) return all;
+    if (fits_in_full(shown(full), dataset_)) return all;
     if (!may_merge(view_)) return {full, box(full), full};
     if (is_drawn_in_full(view_) && has_strided_lines(view_)) {
       // At these levels the lines are the same.
@@ -151,20 +188,22 @@ class Choice {
   }
 
  private:
+  [[nodiscard]] std::vector<ShownField> shown(const std::array<int, 3>& level) const {
+    return shown_at(view_, coarsening_of(lattice_, level), lattice_, dataset_);
+  }
+
   [[nodiscard]] std::array<int, 3> no_finer(std::array<int, 3> level) const {
     for (std::size_t a = 0; a < 3; ++a) level[a] = std::max(level[a], least_[a]);
     return level;
   }
 
   [[nodiscard]] bool fits(const std::array<int, 3>& level) const {
-    const auto shown = shown_at(view_, coarsening_of(lattice_, level));
-    return are_within_limit(shown, view_, lattice_, dataset_);
+    return are_within_limit(shown(level), view_, lattice_, dataset_);
   }
 
   [[nodiscard]] std::optional<data::Box> box(const std::array<int, 3>& level) const {
     if (!may_use_part(view_)) return std::nullopt;
-    const auto shown = shown_at(view_, coarsening_of(lattice_, level));
-    return box_for(view_, camera_, lattice_, level, shown, dataset_);
+    return box_for(view_, camera_, lattice_, level, shown(level), dataset_);
   }
 
   // The coarsest stored level of which no axis is halved more often than in `level`, or the first

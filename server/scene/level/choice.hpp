@@ -22,8 +22,14 @@ data::Coarsening drawn(data::Coarsening how, const protocol::View& view);
 std::uint64_t level_bytes(const Lattice& lattice, std::size_t components,
                           const data::Coarsening& how);
 
+// Vectors whose level is reduced in that way: at full detail of strided lines the middles of their
+// kernels, where these are stored and nothing else needs the samples between them.
+ShownField lines_at(const protocol::View& view, const data::Coarsening& how, const Lattice& lattice,
+                    const data::Dataset& dataset);
+
 // The fields that a view shows, reduced in that way.
-std::vector<ShownField> shown_at(const protocol::View& view, const data::Coarsening& how);
+std::vector<ShownField> shown_at(const protocol::View& view, const data::Coarsening& how,
+                                 const Lattice& lattice, const data::Dataset& dataset);
 
 // Whether what is stored of a level, or of a part of the samples, may be drawn of the view: not of
 // what shows the samples of the whole themselves, as slices and streamlets do, or what a region

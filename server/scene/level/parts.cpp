@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "protocol/view/shown.hpp"
+#include "server/data/model/middles.hpp"
 #include "server/data/model/stored.hpp"
 #include "server/data/resident/budget.hpp"
 #include "server/scene/detail.hpp"
@@ -197,9 +198,9 @@ std::optional<std::uint64_t> bytes_of(const std::vector<ShownField>& shown, cons
                                       const data::Dataset& dataset) {
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t bytes = 0;
-  for (const auto& [field, how] : shown) {
-    if (!counted.emplace(field, how.reduction).second) continue;
-    const auto part = part_of_field(dataset, field, how, box);
+  for (const ShownField& one : shown) {
+    if (!counted.emplace(one.field, one.coarsening.reduction).second) continue;
+    const auto part = part_of_field(dataset, one, box);
     if (!part) return std::nullopt;
     bytes += part->bytes + (part->from ? part->from->bytes : 0);
   }
@@ -285,12 +286,13 @@ std::optional<data::Box> box_for(const View& view, const Camera& camera, const L
   }
 }
 
-std::optional<data::Derivation> part_of_field(const data::Dataset& dataset,
-                                              const std::string& field, const data::Coarsening& how,
-                                              const data::Box& box) {
+std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, const ShownField& shown,
+                                              const data::Box& samples) {
   const data::DatasetInfo& info = dataset.info();
-  const data::FieldInfo* const about = info.find(field);
+  const data::Coarsening& how = shown.coarsening;
+  const data::FieldInfo* const about = info.find(shown.field);
   if (about == nullptr) return std::nullopt;
+  const data::Box box = shown.middles ? data::strided_box(samples, how.stride) : samples;
   const auto index = static_cast<std::size_t>(about - info.fields.data());
   if (how.halvings == full) {
     if (!about->is_read_by_boxes()) return std::nullopt;

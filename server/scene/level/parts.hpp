@@ -27,6 +27,9 @@ struct DrawnPart {
 struct ShownField {
   std::string field;
   data::Coarsening coarsening;
+  // Lines at full detail of which the middles of their kernels alone are read: the draw of groups
+  // that are kernels, whose boxes are data::strided_box() of those of the samples.
+  bool middles = false;
 };
 
 // What a field is drawn from.
@@ -60,9 +63,9 @@ std::optional<data::Box> box_for(const protocol::View& completed, const Camera& 
                                  const std::vector<ShownField>& shown,
                                  const data::Dataset& dataset);
 
-// What is read of a field for a box of a level; nullopt: that is not stored.
-std::optional<data::Derivation> part_of_field(const data::Dataset& dataset,
-                                              const std::string& field, const data::Coarsening& how,
+// What is read of a field for a box of samples of the level that is drawn; nullopt: that is not
+// stored.
+std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, const ShownField& shown,
                                               const data::Box& box);
 
 }  // namespace windsplat::scene

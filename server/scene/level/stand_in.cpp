@@ -31,8 +31,8 @@ bool is_finer(const std::array<int, 3>& level, const std::array<int, 3>& than) {
 std::optional<data::Derivation> derivation_of(const ShownField& shown,
                                               const std::optional<data::Box>& box,
                                               const data::Dataset& dataset) {
-  const auto& [field, how] = shown;
-  if (box) return part_of_field(dataset, field, how, *box);
+  const auto& [field, how, middles] = shown;
+  if (box) return part_of_field(dataset, shown, *box);
   auto stored = dataset.stored_reduction(field, how);
   return stored ? std::move(*stored) : dataset.reduction(field, how);
 }
@@ -47,7 +47,8 @@ class Shown {
         step_(static_cast<std::size_t>(view_.step)) {}
 
   [[nodiscard]] std::vector<ShownField> at(const std::array<int, 3>& halvings) const {
-    return shown_at(view_, coarsening_of(completed_.lattice(), halvings));
+    const Lattice& lattice = completed_.lattice();
+    return shown_at(view_, coarsening_of(lattice, halvings), lattice, dataset_);
   }
 
   [[nodiscard]] std::uint64_t missing_bytes(const DrawnPart& part) const {
@@ -75,9 +76,11 @@ class Shown {
   [[nodiscard]] std::optional<data::Box> resident_box(const std::array<int, 3>& halvings,
                                                       const std::vector<ShownField>& shown) const {
     const data::Box any;
-    const auto how = part_of_field(dataset_, shown.front().field, shown.front().coarsening, any);
+    const ShownField& one = shown.front();
+    const auto how = part_of_field(dataset_, one, any);
     if (!how) return std::nullopt;
-    const auto boxes = dataset_.resident_boxes(shown.front().field, step_, *how, any);
+    auto boxes = dataset_.resident_boxes(one.field, step_, *how, any);
+    if (one.middles) expand(one.coarsening.stride, boxes);
     if (boxes.empty()) return std::nullopt;
     const std::array<int, 3> data_dims = completed_.lattice().dims;
     const std::array<int, 3> quantum = least_quantum(view_, data_dims, halvings);
@@ -102,6 +105,17 @@ class Shown {
   }
 
  private:
+  // Boxes of kernels to those of their samples.
+  void expand(int stride, std::vector<data::Box>& boxes) const {
+    for (data::Box& box : boxes) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int end = (box.first[a] + box.count[a]) * stride;
+        box.first[a] *= stride;
+        box.count[a] = std::min(end, completed_.lattice().dims[a]) - box.first[a];
+      }
+    }
+  }
+
   const protocol::View& view_;
   const CompletedView& completed_;
   const data::Dataset& dataset_;
@@ -117,7 +131,7 @@ bool may_stand_in(const CompletedView& completed, const data::Dataset& dataset) 
 bool is_base(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
   std::vector<std::string> fields;
   std::uint64_t bytes = 0;
-  for (const auto& [field, how] : shown) {
+  for (const auto& [field, how, middles] : shown) {
     if (!dataset.stored_reduction(field, how)) return false;
     bytes += dataset.level_bytes(field, how) + dataset.bytes_beside_level(field, how);
     fields.push_back(field);

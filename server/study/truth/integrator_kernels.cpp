@@ -175,8 +175,9 @@ struct Arrow {
 
 std::optional<Arrow> arrow_of(const Scene& scene, const VectorLayer& layer, const Cell& cell) {
   Vec data;
+  const std::size_t number = scene.lattice.number_of(cell.sample, layer.field_stride);
   for (int c = 0; c < layer.field->components; ++c) {
-    const float value = layer.field->component(c)[cell.index];
+    const float value = layer.field->component(c)[number];
     if (std::isnan(value)) return {};
     data[c] = value;
   }

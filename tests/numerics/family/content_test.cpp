@@ -206,6 +206,15 @@ TEST(Content, LinesAreSeenInTheDirectionInWhichTheyAreDrawn) {
   }
 }
 
+TEST(Content, LinesOfALevelAreThoseOfItsGroups) {
+  scene::Scene scene = scene_of_lines({0, 1, 0});
+  const double level = frame::content_of(scene)->length;
+  scene.vector->halvings = {1, 1, 1};
+  scene.vector->data_dims = {12, 12, 12};
+  scene.vector->drawn_places = {2, 2, 2};
+  EXPECT_NEAR(frame::content_of(scene)->length, level, 1e-6);
+}
+
 // The opaque front of a medium does not hide the part of a line that lies before it, so lines stay
 // visible however dense the medium is.
 TEST(Content, LinesInTheFirstLayerOfAnOpaqueMediumAreSeen) {

@@ -41,6 +41,7 @@ Scene of_whole_level(const Scene& part, const scene::CompletedView& completed,
     layer.field = roomy.level("cloud", 0, how).value();
   if (whole.vector) {
     whole.vector->field = roomy.level("wind", 0, scene::drawn(how, completed.view())).value();
+    whole.vector->field_stride = 1;
   }
   return whole;
 }
@@ -64,9 +65,31 @@ double share_of(const Scene& part) {
   return share;
 }
 
+// Of the samples that are drawn of a view at full detail.
+std::uint64_t bytes_in_full(const scene::CompletedView& completed, const data::Dataset& dataset) {
+  const scene::Lattice& lattice = completed.lattice();
+  const Coarsening full = scene::coarsening_of(lattice, {0, 0, 0});
+  std::uint64_t bytes = 0;
+  for (const scene::ShownField& one : scene::shown_at(completed.view(), full, lattice, dataset)) {
+    bytes += dataset.level_bytes(one.field, one.coarsening);
+  }
+  return bytes;
+}
+
+// At every sample of a column of the data.
+void look_along_axis(protocol::View& view, std::size_t axis) {
+  view.method.detail = protocol::Detail::full;
+  view.camera.eye = view.camera.target;
+  (*view.camera.eye)[axis] += 1;
+  view.camera.fov_y *= 0.3;
+  if (view.camera.height) *view.camera.height *= 0.3;
+}
+
 struct Tally {
   int parts = 0;
-  int drawn = 0;  // pictures that show something
+  int middles = 0;        // pictures of boxes of lines drawn from the middles of kernels
+  int whole_middles = 0;  // the same of the whole
+  int drawn = 0;          // pictures that show something
   std::map<int, int> by_level;
 };
 
@@ -76,20 +99,26 @@ void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName me
   Random random(seed);
   data::Dataset roomy = store(100 * samples_bytes, uneven);
   for (int n = 0; n < views; ++n) {
-    // From a fraction of a scalar to most of the fields.
-    const double share = std::exp(random.within(std::log(0.3), std::log(4)));
-    data::Dataset tight =
-        store(static_cast<std::uint64_t>(share * static_cast<double>(samples_bytes)), uneven);
     protocol::View view = random_view(random);
     view.method.name = method;
+    if (random.below(2) == 0) look_along_axis(view, static_cast<std::size_t>(random.below(2)));
     if (method == protocol::MethodName::reference) view.image = {12, 9};
     const auto plain = scene::complete(view, roomy);
     ASSERT_TRUE(plain) << plain.error().message;
     const auto completed = plain->coarsened(random.below(3));
+    // From a fraction of what is drawn at full detail to more than all of it.
+    const double share = std::exp(random.within(std::log(0.1), std::log(2)));
+    data::Dataset tight = store(
+        static_cast<std::uint64_t>(share * static_cast<double>(bytes_in_full(completed, roomy))),
+        uneven);
     const scene::DrawnPart chosen = scene::part_of(completed, tight);
-    if (!chosen.box) continue;
+    const bool full = chosen.halvings == std::array{0, 0, 0};
+    if (!chosen.box && !full) continue;
     const auto part = scene::build_scene(completed, tight);
+    if (!chosen.box && !part) continue;  // does not fit
     ASSERT_TRUE(part) << part.error().message;
+    const bool middles = part->vector && part->vector->field_stride > 1;
+    if (!chosen.box && !middles) continue;
     const Scene whole = of_whole_level(*part, completed, roomy);
     engine::WorkReport of_part, of_whole;
     const std::vector<float> found = picture_of(*part, &of_part);
@@ -103,25 +132,29 @@ void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName me
     const auto shows = [](float v) { return v > 0; };
     const bool any = std::any_of(found.begin(), found.end(), shows);
     tally.drawn += any ? 1 : 0;
+    if (any && middles) ++(chosen.box ? tally.middles : tally.whole_middles);
     if (any) ++tally.by_level[part->level[0]];
   }
 }
 
 TEST(Part, PicturesOfBothMethodsAreThoseOfTheWholeLevel) {
   Tally tally;
-  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
-    compare(false, 1, 60, method, tally);
-    compare(true, 2, 60, method, tally);
-  }
+  compare(false, 1, 90, protocol::MethodName::kernel, tally);
+  compare(true, 2, 90, protocol::MethodName::kernel, tally);
+  compare(false, 3, 90, protocol::MethodName::slab, tally);
+  compare(true, 4, 90, protocol::MethodName::slab, tally);
   EXPECT_GT(tally.parts, 60);
   EXPECT_GT(tally.drawn, 80);
-  for (int level = 0; level < levels; ++level) EXPECT_GT(tally.by_level[level], 4) << level;
+  EXPECT_GT(tally.middles, 10);
+  EXPECT_GT(tally.whole_middles, 20);
+  for (int level = 0; level < levels; ++level) EXPECT_GT(tally.by_level[level], 10) << level;
 }
 
 TEST(Part, TheReferenceIsThatOfTheWhole) {
   Tally tally;
-  compare(false, 3, 80, protocol::MethodName::reference, tally);
-  EXPECT_GT(tally.drawn, 2);
+  compare(false, 3, 30, protocol::MethodName::reference, tally);
+  EXPECT_GT(tally.drawn, 5);
+  EXPECT_GT(tally.middles + tally.whole_middles, 2);
 }
 
 TEST(Part, AViewOfFewVoxelsHasTheirExactValues) {

@@ -45,7 +45,7 @@ void load_box(data::Dataset& dataset, const scene::CompletedView& completed, int
               const data::Box& box, const std::string& field = "cloud") {
   auto how = scene::coarsening_of(completed.lattice(), {halvings, halvings, halvings});
   if (field == "wind") how = scene::drawn(how, completed.view());
-  const auto part = scene::part_of_field(dataset, field, how, box);
+  const auto part = scene::part_of_field(dataset, {field, how}, box);
   ASSERT_TRUE(dataset.derived(field, 0, part.value()));
 }
 

@@ -182,8 +182,9 @@ TEST(Stored, StridedDrawsAreMadeFromMiddlesOfKernels) {
   for (const int stride : {2, 4}) {
     for (const int h : {1, 2, 3}) {
       const Coarsening how = halved_by(h, Reduction::drawn, stride);
+      const bool kernels = 1 << h == stride;  // the middles themselves
       EXPECT_EQ(f.dataset.bytes_beside_level("v", how),
-                2 * scalar_bytes / static_cast<unsigned>(stride * stride * stride));
+                kernels ? 0 : 2 * scalar_bytes / static_cast<unsigned>(stride * stride * stride));
       const auto level = f.dataset.level("v", 0, how);
       ASSERT_TRUE(level) << level.error().message;
       expect_equal(**level, coarsen(SourceWithLevels::made(1, 0), how));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/data/model/middles.hpp"
 #include "server/data/model/stored.hpp"
 #include "tests/unit/data/formats/level_store.hpp"
 
@@ -121,8 +122,34 @@ TEST(ZarrLevels, OfOtherWeightsAreNotTaken) {
   EXPECT_TRUE(stored_level(info, index_of(info, "wind"), how)) << "draws have no weights";
   how.halvings = {1, 1, 0};
   EXPECT_FALSE(stored_level(info, index_of(info, "wind"), how));
-  how = LevelStore::how(1, true, 2);
+  how = LevelStore::how(3, true, 2);
   EXPECT_FALSE(stored_level(info, index_of(info, "wind"), how));
+}
+
+TEST(ZarrLevels, GroupsThatAreKernelsHaveTheirMiddles) {
+  const LevelStore store;
+  const auto source = opened(store.path());
+  ASSERT_NE(source, nullptr);
+  const DatasetInfo& info = source->info();
+  const std::size_t field = index_of(info, "wind");
+  const Volume fine = volume_of(store.plain(), "wind", 1);
+  for (const int stride : {2, 4}) {  // no level halves all axes twice
+    const Coarsening how = middles_of(stride);
+    const auto part = stored_level(info, field, how);
+    ASSERT_TRUE(part) << stride;
+    EXPECT_EQ(part->as, StoredAs::strided);
+    const auto found = source->read_part(field, 1, *part);
+    ASSERT_TRUE(found) << found.error().message;
+    expect_equal(*found, coarsen(fine, how), std::to_string(stride));
+    for (int n = 0; n < found->dims[0]; ++n) {
+      const int x = strided_sample(n, stride, fine.dims[0]);
+      const int y = strided_sample(0, stride, fine.dims[1]) * fine.dims[0];
+      const int z = strided_sample(0, stride, fine.dims[2]) * fine.dims[0] * fine.dims[1];
+      EXPECT_EQ(found->component(1)[n], fine.component(1)[x + y + z]) << n;
+    }
+  }
+  EXPECT_FALSE(stored_level(info, field, middles_of(8)));
+  EXPECT_FALSE(stored_level(info, index_of(info, "cloud"), middles_of(2)));
 }
 
 TEST(ZarrLevels, OnlyTheFieldsOfLevelZeroAreShown) {
