@@ -155,20 +155,19 @@ Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   view.image.height =
       std::max(1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) *
                                                knobs.width / subject.view.image.width)));
+  // Layers of different strides keep their ratio. A scene is built for its strides: lines of a
+  // store may be drawn from the vectors of one stride alone.
+  const int own = own_knobs(subject).stride;
+  const auto strided = [&](int stride) { return std::max(1, stride * knobs.stride / own); };
+  view.vector.stride = strided(view.vector.stride.value());
+  for (protocol::ScalarView& medium : *view.scalars) medium.stride = strided(medium.stride);
   auto scene = scene::build_scene(view, *subject.dataset);
   if (!scene) return scene.error();
   scene->method = setting.method;
   scene->compositing = setting.compositing;
   scene->slab_thickness = knobs.slab_thickness;
   scene->stop_transmittance = knobs.stop_transmittance;
-  // Layers of different strides keep their ratio.
-  const int own = own_knobs(subject).stride;
-  const auto strided = [&](int stride) { return std::max(1, stride * knobs.stride / own); };
-  if (scene->vector) {
-    scene->vector->stride = strided(scene->vector->stride);
-    scene->vector->span = knobs.span;
-  }
-  for (scene::ScalarLayer& layer : scene->scalars) layer.stride = strided(layer.stride);
+  if (scene->vector) scene->vector->span = knobs.span;
   return scene;
 }
 

@@ -12,6 +12,7 @@
 #include "server/scene/lattice.hpp"
 #include "server/scene/place.hpp"
 #include "server/study/metrics.hpp"
+#include "tests/unit/frame/part_store.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::study {
@@ -86,6 +87,33 @@ TEST(Scene, AppliesItsParametersAndScalesLinesWithThePicture) {
       scene_at(subject, {Method::kernel, Compositing::cd, own_knobs(subject)}).value();
   EXPECT_EQ(scene.camera.half_height, whole.camera.half_height);
   EXPECT_EQ(scene.camera.eye, whole.camera.eye);
+}
+
+// Of a store with levels lines may have the vectors of one stride alone.
+TEST(Scene, OfAStoreHasTheVectorsOfEachStride) {
+  namespace of_store = frame::of_store;
+  auto dataset = std::make_shared<data::Dataset>(of_store::store(100 * of_store::samples_bytes));
+  protocol::View view = of_store::of_one_voxel();
+  view.camera.height = 0.6;
+  view.scalars->front().stride = 2;
+  view.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
+  view.vector.stride = 4;
+  view.vector.length = 0.05;
+  const Subject subject = make_subject("store", dataset, view, {40, 30}).value();
+  ThreadPool pool(1);
+  for (const auto& [stride, apart] : {std::pair{4, 4}, std::pair{8, 8}, std::pair{12, 1}}) {
+    Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
+    setting.knobs.stride = stride;
+    scene::Scene scene = scene_at(subject, setting).value();
+    EXPECT_EQ(scene.vector->stride, stride);
+    EXPECT_EQ(scene.scalars.at(0).stride, stride / 2);
+    EXPECT_EQ(scene.vector->field_stride, apart);
+    const auto drawn = engine::render(scene, pool, CancelToken()).value();
+    EXPECT_GT(drawn.work.pixel_updates, 0);
+    scene.vector->field = dataset->volume("wind", 0).value();
+    scene.vector->field_stride = 1;
+    EXPECT_EQ(drawn.image.rgba, engine::render(scene, pool, CancelToken()).value().image.rgba);
+  }
 }
 
 // soft and dense are named after the optical depth of their deepest row of samples.
