@@ -179,6 +179,10 @@ class Choice {
     if (fits_in_full(shown(full), dataset_)) return all;
     if (!may_merge(view_)) return {full, box(full), full};
     if (is_drawn_in_full(view_) && has_strided_lines(view_)) {
+      const ShownField lines = shown(full).front();
+      if (lines.middles) {
+        if (auto of_middles = box(full)) return {full, of_middles, full};
+      }
       // At these levels the lines are the same.
       while (2 << level[0] <= *view_.vector.stride) {
         for (int& h : level) ++h;

@@ -153,6 +153,20 @@ TEST(Middles, FitWhereTheSamplesDoNot) {
   EXPECT_TRUE(scene::build_scene(completed_of(of_lines(4)), dataset));
 }
 
+TEST(Middles, OfLinesAloneABoxIsDrawnWhereTheWholeDoesNotFit) {
+  // Middles of 3/8 parts.
+  data::Dataset dataset = store(samples_bytes / 3);
+  protocol::View view = of_lines(2);
+  view.scalars->clear();
+  view.camera.height = 0.004;
+  view.vector.length = 0.001;
+  view.method.detail = protocol::Detail::automatic;
+  const auto part = scene::part_of(completed_of(view), dataset);
+  EXPECT_EQ(part.halvings, (std::array{0, 0, 0}));
+  EXPECT_TRUE(part.box);
+  EXPECT_EQ(part.wanted, (std::array{0, 0, 0}));
+}
+
 TEST(Middles, APickHasTheVectorOfTheKernel) {
   data::Dataset dataset = store(100 * samples_bytes);
   protocol::View view = of_lines(4);
