@@ -96,9 +96,15 @@ std::string all_masked(const std::string& field, const protocol::View& view, boo
 
 // Empty: values of the vectors do not explain it.
 std::string why_no_lines(const scene::VectorLayer& layer, const protocol::View& view,
-                         const std::optional<scene::Slice>& slice) {
+                         const data::Dataset& dataset, const std::optional<scene::Slice>& slice) {
   const std::string& field = view.vector.field.name;
-  const Span span = span_of(*layer.field, slice);
+  Span span = span_of(*layer.field, slice);
+  if (layer.field_stride > 1) {  // what is held are the middles of kernels
+    const auto all = dataset.seen(field, static_cast<std::size_t>(view.step));
+    if (!all) return "";
+    const bool masked = all->masked == static_cast<std::int64_t>(dataset.info().grid.samples());
+    span = masked ? Span() : std::array{double{all->range[0]}, double{all->range[1]}};
+  }
   if (!span) return all_masked(field, view, slice.has_value());
   const double largest = (*span)[1];
   if (!(largest > 0)) return "every vector of " + quoted(field) + " is zero";
@@ -118,7 +124,8 @@ std::string why_no_medium(const scene::ScalarLayer& layer, const std::string& fi
 }
 
 std::string reasons(const scene::Scene& scene, const protocol::View& view,
-                    const std::vector<std::string>& surfaces, const engine::WorkReport& work) {
+                    const data::Dataset& dataset, const std::vector<std::string>& surfaces,
+                    const engine::WorkReport& work) {
   if (!scene.vector && scene.scalars.empty() && scene.surfaces.empty()) {
     return "the view shows no field: neither lines of an opacity above 0 nor a medium of an "
            "extinction above 0";
@@ -132,12 +139,9 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
       all.push_back(std::move(reason));
     }
   };
-  // What is held of a part explains nothing of the whole, nor do the middles of kernels.
+  // What is held of a part explains nothing of the whole.
   const bool part = scene.lattice.part.has_value();
-  if (scene.vector) {
-    const bool all = !part && scene.vector->field_stride == 1;
-    add(all ? why_no_lines(*scene.vector, view, scene.slice) : "");
-  }
+  if (scene.vector) add(part ? "" : why_no_lines(*scene.vector, view, dataset, scene.slice));
   auto layer = scene.scalars.begin();
   for (std::size_t i = 0; i < view.scalars->size() && layer != scene.scalars.end(); ++i) {
     const protocol::ScalarView& scalar = (*view.scalars)[i];
@@ -160,14 +164,14 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
 }  // namespace
 
 std::string why_empty(const scene::Scene& scene, const protocol::View& view,
-                      const std::vector<std::string>& surfaces, const engine::WorkReport& work,
-                      bool transparent) {
+                      const data::Dataset& dataset, const std::vector<std::string>& surfaces,
+                      const engine::WorkReport& work, bool transparent) {
   // The report does not count the pixels of surfaces: any triangle counts as drawn.
   const bool drawn = work.variant.reference                    ? !transparent
                      : scene.surfaces.size() > surfaces.size() ? true
                      : scene.body ? work.culled + work.skipped_both < work.samples
                                   : work.pixel_updates > 0;
-  return drawn ? "" : reasons(scene, view, surfaces, work);
+  return drawn ? "" : reasons(scene, view, dataset, surfaces, work);
 }
 
 }  // namespace windsplat::frame

@@ -416,7 +416,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   const bool transparent = drawn.work.variant.reference && is_transparent(workspace.space.image());
   auto missing = missing_surfaces(prepared, dataset);
   if (!missing) return given_up(missing.error(), workspace);
-  drawn.empty = why_empty(scene, drawn.view, *missing, drawn.work, transparent);
+  drawn.empty = why_empty(scene, drawn.view, dataset, *missing, drawn.work, transparent);
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
   drawn.halvings = halvings_of(prepared, dataset);

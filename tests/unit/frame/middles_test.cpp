@@ -7,10 +7,12 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "server/data/model/stored.hpp"
+#include "server/frame/empty_picture.hpp"
 #include "server/frame/pick/pick.hpp"
 #include "server/frame/pixel_trials.hpp"
 #include "server/scene/build.hpp"
@@ -165,6 +167,22 @@ TEST(Middles, OfLinesAloneABoxIsDrawnWhereTheWholeDoesNotFit) {
   EXPECT_EQ(part.halvings, (std::array{0, 0, 0}));
   EXPECT_TRUE(part.box);
   EXPECT_EQ(part.wanted, (std::array{0, 0, 0}));
+}
+
+TEST(Middles, AnEmptyPictureIsExplainedByTheRangeOfTheField) {
+  data::Dataset dataset = store(100 * samples_bytes);
+  const auto why = [&](int stride) {
+    protocol::View view = of_lines(stride);
+    view.scalars->clear();
+    view.vector.min_magnitude = 100;
+    const auto completed = completed_of(view);
+    const auto scene = scene::build_scene(completed, dataset).value();
+    EXPECT_EQ(scene.vector->field_stride, stride == 3 ? 1 : stride);
+    return why_empty(scene, completed.view(), dataset, {}, engine::WorkReport(), true);
+  };
+  const std::string wanted = why(3);  // by all samples
+  EXPECT_NE(wanted.find("is below /vector/minMagnitude 100"), std::string::npos) << wanted;
+  EXPECT_EQ(why(8), wanted);
 }
 
 TEST(Middles, APickHasTheVectorOfTheKernel) {

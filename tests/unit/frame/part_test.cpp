@@ -231,7 +231,7 @@ TEST(Part, AnEmptyPictureIsNotExplainedByTheValuesOfAPart) {
   const auto why = [&](data::Dataset dataset) {
     const auto completed = scene::complete(view, dataset).value();
     const Scene scene = scene::build_scene(completed, dataset).value();
-    return why_empty(scene, completed.view(), {}, engine::WorkReport(), true);
+    return why_empty(scene, completed.view(), dataset, {}, engine::WorkReport(), true);
   };
   EXPECT_NE(why(store(100 * samples_bytes)).find("at every value of"), std::string::npos);
   EXPECT_EQ(why(store(samples_bytes / 2)), "the camera does not show the data");
