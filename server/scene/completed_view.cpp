@@ -270,7 +270,8 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
 
 std::uint64_t completions() { return completed_views; }
 
-Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
+Result<ViewOutline> outline(const View& view, const data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
   ViewOutline out;
   out.view = view;
   if (auto ok = check(view, info); !ok) return ok.error();
@@ -295,6 +296,7 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
     out.lattice = cropped_place(whole, ranges, std::move(*crop)).lattice;
   }
   if (auto ok = check_section(out.view, out.lattice); !ok) return ok.error();
+  set_stored_stride(out.view, out.lattice, dataset);
   const auto camera = complete_from_description(out.view, info, out.lattice);
   if (!camera) return camera.error();
   out.camera = *camera;

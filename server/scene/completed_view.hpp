@@ -82,7 +82,7 @@ struct ViewOutline {
   bool bent = false;  // will be drawn on a bent lattice
 };
 // Loads nothing. Errors: those of complete() that need no data.
-Result<ViewOutline> outline(const protocol::View& view, const data::DatasetInfo& info);
+Result<ViewOutline> outline(const protocol::View& view, const data::Dataset& dataset);
 
 // How many vectors the view leaves out by /vector/minMagnitude at the step from which defaults
 // follow, which it names, for notes; empty: less than a hundredth. Errors: those of loading the

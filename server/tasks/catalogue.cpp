@@ -197,7 +197,7 @@ void Catalogue::remove(const std::string& id) {
 Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
   const auto dataset = find_shown(*this, view);
   if (!dataset) return dataset.error();
-  const auto outline = scene::outline(view, (*dataset)->info());
+  const auto outline = scene::outline(view, **dataset);
   if (!outline) return outline.error();
   if (auto ok = scene::check_difference(view, **dataset); !ok) return ok.error();
   std::size_t steps = (*dataset)->info().steps.size();

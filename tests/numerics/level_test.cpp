@@ -87,7 +87,7 @@ TEST(Level, KeepsMeanOpacityAndColorOfLinesAndMedia) {
 // The estimated work of a view over that which its frame reports, both in the units of frame::Cost.
 double estimate_over_count(const scene::CompletedView& completed, data::Dataset& dataset,
                            bool merged) {
-  const auto outline = scene::outline(completed.view(), dataset.info()).value();
+  const auto outline = scene::outline(completed.view(), dataset).value();
   const auto scene = scene::build_scene(completed, dataset).value();
   EXPECT_EQ(scene.level != (std::array{0, 0, 0}), merged);
   const engine::WorkReport work = render(scene, 2).work;

@@ -141,7 +141,7 @@ struct Timed {
 Timed timed(const View& asked, data::Dataset& dataset, ThreadPool& pool) {
   Timed out;
   const auto completed = value_or_give_up(scene::complete(asked, dataset));
-  const auto outline = value_or_give_up(scene::outline(asked, dataset.info()));
+  const auto outline = value_or_give_up(scene::outline(asked, dataset));
   out.kernels = frame::cost_of(outline, dataset).kernels;
   engine::RenderSpace space;
   const double start = now_ms();

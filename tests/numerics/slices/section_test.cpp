@@ -129,7 +129,7 @@ TEST(Plane, SamplesNextToAMaskedOneAreMasked) {
 
 std::string refusal(const View& view, data::Dataset& dataset) {
   const auto completed = complete(view, dataset);
-  const auto outlined = outline(view, dataset.info());
+  const auto outlined = outline(view, dataset);
   EXPECT_EQ(completed.has_value(), outlined.has_value());
   if (completed) return "";
   EXPECT_EQ(completed.error().kind, ErrorKind::invalid);

@@ -30,7 +30,7 @@ class CostTest : public testing::Test {
   }
 
   frame::Cost cost(const protocol::View& view) {
-    const auto outline = scene::outline(view, dataset_->info());
+    const auto outline = scene::outline(view, *dataset_);
     EXPECT_TRUE(outline) << (outline ? "" : outline.error().message);
     return frame::cost_of(outline.value(), *dataset_);
   }
@@ -215,7 +215,7 @@ TEST_F(CostTest, CountsEverySampleWhereLevelsDoNotFitIntoMemory) {
   const auto within = [&](double bytes) {
     const data::Dataset dataset(data::open_sample("tornado", {100, 80, 60}).value(), "tornado",
                                 static_cast<std::uint64_t>(bytes));
-    return frame::cost_of(scene::outline(far, dataset.info()).value(), dataset).kernels;
+    return frame::cost_of(scene::outline(far, dataset).value(), dataset).kernels;
   };
   const double wind = 3 * sizeof(float) * samples;
   EXPECT_LT(within(wind + wind / 8), 0.2 * all);

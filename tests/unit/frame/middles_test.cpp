@@ -169,6 +169,18 @@ TEST(Middles, OfLinesAloneABoxIsDrawnWhereTheWholeDoesNotFit) {
   EXPECT_EQ(part.wanted, (std::array{0, 0, 0}));
 }
 
+TEST(Middles, AnOutlineHasTheDefaultStrideOfTheStore) {
+  protocol::View view = of_lines(1);
+  view.vector.stride.reset();
+  const auto stride_in = [&](data::Dataset dataset) {
+    const int stride = scene::outline(view, dataset).value().view.vector.stride.value();
+    EXPECT_EQ(stride, scene::complete(view, dataset).value().view().vector.stride);
+    return stride;
+  };
+  const int stride = stride_in(store(100 * samples_bytes));
+  EXPECT_GT(stride_in(store(samples_bytes)), stride) << "of which the middles are stored";
+}
+
 TEST(Middles, AnEmptyPictureIsExplainedByTheRangeOfTheField) {
   data::Dataset dataset = store(100 * samples_bytes);
   const auto why = [&](int stride) {

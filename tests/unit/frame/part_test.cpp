@@ -254,9 +254,9 @@ TEST(Part, CostCountsThePart) {
   view.image = {320, 240};
   view.method.detail = protocol::Detail::full;
   const auto of = [&](data::Dataset& dataset) {
-    return cost_of(scene::outline(view, dataset.info()).value(), dataset).kernels;
+    return cost_of(scene::outline(view, dataset).value(), dataset).kernels;
   };
-  const auto outline = scene::outline(view, tight.info()).value();
+  const auto outline = scene::outline(view, tight).value();
   ASSERT_TRUE(scene::part_of(outline, tight).box);
   EXPECT_LT(of(tight), 0.9 * of(roomy));
 }
