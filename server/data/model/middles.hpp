@@ -7,6 +7,7 @@
 
 #include "server/data/model/box.hpp"
 #include "server/data/model/coarsen.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace windsplat::data {
 
@@ -29,5 +30,9 @@ inline Coarsening middles_of(int stride) {
   how.stride = stride;
   return how;
 }
+
+// The middles of a box of the kernels of that stride, from a volume of all samples: what is stored
+// as `strided`, bit for bit.
+Volume middles(const Volume& all, int stride, const Box& kernels);
 
 }  // namespace windsplat::data

@@ -109,6 +109,23 @@ TEST(Middles, LinesOfABoxReadThoseInIt) {
   EXPECT_LT(of.log->parts[0].box.samples(), scene.lattice.part->samples() / 6);
 }
 
+TEST(Middles, AChangeOfStrideOfAResidentWindReadsNothing) {
+  Logged of(100 * samples_bytes);
+  ASSERT_TRUE(scene::build_scene(completed_of(of_lines(3)), of.dataset));
+  for (const int stride : {2, 4, 8}) {
+    const auto completed = completed_of(of_lines(stride));
+    const auto scene = scene::build_scene(completed, of.dataset).value();
+    EXPECT_EQ(scene.vector->field_stride, stride);
+    Logged other(100 * samples_bytes);
+    const auto read = scene::build_scene(completed, other.dataset).value();
+    EXPECT_EQ(test::render(scene, 1).image.rgba, test::render(read, 1).image.rgba);
+    EXPECT_EQ(scene.vector->field->masked, read.vector->field->masked);
+    EXPECT_EQ(scene.vector->field->range, read.vector->field->range);
+  }
+  EXPECT_EQ(of.log->wholes, 1);
+  EXPECT_TRUE(of.log->parts.empty());
+}
+
 // What the samples between them are needed for.
 TEST(Middles, EverySampleIsReadWhereLinesAreNotAlone) {
   const auto reads_all = [](const protocol::View& view) {

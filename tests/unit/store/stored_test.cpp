@@ -215,6 +215,38 @@ Derivation part_of(const StoredPart& part, std::uint64_t values) {
   return how;
 }
 
+TEST(Stored, MiddlesOfAResidentVolumeAreNotRead) {
+  StoredFixture f;
+  ASSERT_TRUE(f.dataset.volume("v", 0));
+  const Volume all = SourceWithLevels::made(1, 0);
+  for (const int h : {1, 2}) {
+    const Coarsening how = halved_by(h, Reduction::drawn, 1 << h);
+    const auto level = f.dataset.level("v", 0, how);
+    ASSERT_TRUE(level) << level.error().message;
+    expect_equal(**level, coarsen(all, how));
+    const StoredPart box{{{3, 2, 1}, {6, 4, 3}}, static_cast<std::size_t>(h), StoredAs::strided};
+    const auto part = f.dataset.derived("v", 0, part_of(box, 2));
+    ASSERT_TRUE(part) << part.error().message;
+    expect_equal(**part, cut(coarsen(all, how), box.box));
+  }
+  EXPECT_EQ(f.log->wholes, 1);
+  EXPECT_TRUE(f.log->parts.empty());
+  EXPECT_TRUE(f.dataset.level("v", 1, halved_by(1, Reduction::drawn, 2)));
+  EXPECT_EQ(f.log->parts.size(), 1U) << "of a step that is not resident";
+}
+
+TEST(Stored, MiddlesOfAPackedVolumeAreRead) {
+  const auto log = std::make_shared<PartLog>();
+  Dataset dataset(std::make_unique<SourceWithLevels>(log), "grid",
+                  std::make_shared<Budget>(100 * scalar_bytes), Storage::packed16);
+  ASSERT_TRUE(dataset.volume("v", 0));
+  const Coarsening how = halved_by(1, Reduction::drawn, 2);
+  const auto level = dataset.level("v", 0, how);
+  ASSERT_TRUE(level) << level.error().message;
+  expect_equal(**level, coarsen(SourceWithLevels::made(1, 0), how));
+  EXPECT_EQ(log->parts.size(), 1U);
+}
+
 TEST(Stored, ResidentBytesAreThoseOfEachLevel) {
   using Bytes = std::vector<std::uint64_t>;
   StoredFixture f;
