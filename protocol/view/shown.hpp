@@ -35,7 +35,7 @@ inline bool is_section(const GeometryView& geometry) {
 }
 
 // Whether samples are never merged. The splats of a stride are those of its samples. Lines with a
-// stride without a medium leave out more samples than a level would. The reference uses all
+// stride without a medium leave out more samples than a level would. The reference merges no
 // samples, a section has its own, and streamlets follow the field itself.
 inline bool is_drawn_in_full(const View& view) {
   const auto any = [&](const auto& holds) {

@@ -90,7 +90,7 @@ class Dataset {
   // The computation of level() from the field, or from what is derived from it.
   [[nodiscard]] Derivation reduction(const std::string& field, const Coarsening& how) const;
   // The same by what the source has stored: the level itself, or the middles of kernels from which
-  // it is drawn. It has the bits of reduction(), and its variant. nullopt: neither is stored.
+  // it is drawn. It has the bits of reduction(). nullopt: neither is stored.
   [[nodiscard]] std::optional<Derivation> stored_reduction(const std::string& field,
                                                            const Coarsening& how) const;
   [[nodiscard]] bool has(const std::string& field, std::size_t step, const Derivation& how) const;
@@ -210,7 +210,7 @@ class Dataset {
   [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::uint64_t resident_bytes() const;
   // The same of each stored level, full detail first: volumes and boxes of the fields, at all
-  // steps. What is computed beyond that, as differences and regions, is of no level.
+  // steps, and the middles of kernels stored there. Differences and regions are of no level.
   [[nodiscard]] std::vector<std::uint64_t> resident_bytes_of_levels() const;
   [[nodiscard]] std::uint64_t loads() const { return counts().loads; }
   [[nodiscard]] std::uint64_t levels() const { return counts().levels; }
