@@ -26,9 +26,6 @@ data::Volume reduce(const Plan& plan, const Product& product, const data::Volume
       how.reduction = data::Reduction::drawn;
       break;
     case Reduced::strided:
-      how.reduction = data::Reduction::drawn;
-      how.stride = 1 << how.halvings[0];
-      break;
     case Reduced::two_values:
     case Reduced::samples:
       break;

@@ -9,6 +9,7 @@
 
 #include "server/convert/coordinates.hpp"
 #include "server/data/cf/written/attributes.hpp"
+#include "server/data/model/middles.hpp"
 #include "server/data/model/stored.hpp"
 
 namespace windsplat::convert {
@@ -127,9 +128,7 @@ class Planner {
     plan_.units_along = over(plan_.dims, plan_.unit);
     for (const data::Coarsening& how : chain_) plan_.levels.push_back(level_of(how, brick));
     for (int n = 0; n <= data::strided_levels_max && n < static_cast<int>(chain_.size()); ++n) {
-      data::Coarsening how;
-      how.halvings = {n, n, n};
-      plan_.middles.push_back(level_of(how, brick));
+      plan_.middles.push_back(level_of(data::middles_of(1 << n), brick));
     }
     for (std::size_t a = 0; a < 3; ++a) keep_widths(a);
   }

@@ -137,10 +137,9 @@ std::uint64_t Dataset::bytes_beside_level(const std::string& field, const Coarse
   if (!index) return 0;
   if (minus_) return loading_bytes(field);
   if (stored_level(info, *index, how)) return 0;
-  const auto middles =
-      how.reduction == Reduction::drawn ? stored_middles(info, *index, how.stride) : std::nullopt;
-  if (!middles) return loading_bytes(field);
-  return middles->box.samples() * info.fields[*index].components.size() * sizeof(float);
+  const bool from_middles =
+      how.reduction == Reduction::drawn && stored_middles(info, *index, how.stride);
+  return from_middles ? level_bytes(field, middles_of(how.stride)) : loading_bytes(field);
 }
 
 std::uint64_t Dataset::least_bytes(const std::string& field) const {

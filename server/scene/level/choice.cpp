@@ -124,7 +124,7 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
 }
 
 // Whether what is drawn of all fields at full detail fits into memory.
-bool fits_in_full(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
+bool all_detail_fits(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
   std::set<std::string> counted;
   std::uint64_t bytes = 0;
   for (const ShownField& one : shown) {
@@ -176,7 +176,7 @@ class Choice {
     }
     const DrawnPart all{full, std::nullopt, level};
     if (!may_use_stored(view_, lattice_, dataset_)) return all;
-    if (fits_in_full(shown(full), dataset_)) return all;
+    if (all_detail_fits(shown(full), dataset_)) return all;
     if (!may_merge(view_)) return {full, box(full), full};
     if (is_drawn_in_full(view_) && has_strided_lines(view_)) {
       const ShownField lines = shown(full).front();
