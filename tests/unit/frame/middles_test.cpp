@@ -9,9 +9,13 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
+#include "server/annotate/annotate.hpp"
+#include "server/annotate/legend.hpp"
 #include "server/data/model/stored.hpp"
+#include "server/frame/content.hpp"
 #include "server/frame/empty_picture.hpp"
 #include "server/frame/pick/pick.hpp"
 #include "server/frame/pixel_trials.hpp"
@@ -263,6 +267,69 @@ TEST(Middles, EstimatesByKernelsAreThoseOfAllSamples) {
   EXPECT_GT(found.trials.value().kernel, 0);
   EXPECT_EQ(found.trials.value().kernel, wanted.trials.value().kernel);
   EXPECT_EQ(found.trials.value().slab, wanted.trials.value().slab);
+}
+
+TEST(Middles, ContentIsThatOfVectorsOfKernels) {
+  data::Dataset dataset = store(100 * samples_bytes);
+  protocol::View view = of_lines(4);
+  view.vector.min_magnitude = 0.4;
+  const auto scene = scene::build_scene(completed_of(view), dataset).value();
+  ASSERT_EQ(scene.vector->field_stride, 4);
+  const data::Volume& middles = *scene.vector->field;
+  auto spread = std::make_shared<data::Volume>();
+  spread->dims = dims;
+  spread->components = 3;
+  std::vector<float> values;
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < dims[2]; ++k) {
+      for (int j = 0; j < dims[1]; ++j) {
+        for (int i = 0; i < dims[0]; ++i) {
+          const int at = ((k / 4) * middles.dims[1] + j / 4) * middles.dims[0] + i / 4;
+          values.push_back(middles.component(c)[at]);
+        }
+      }
+    }
+  }
+  spread->values = std::move(values);
+  finish_volume(*spread);
+  scene::Scene all = scene;
+  all.vector->field = spread;
+  all.vector->field_stride = 1;
+  const auto found = content_of(scene).value();
+  const auto wanted = content_of(all).value();
+  EXPECT_GT(found.lines, 0);
+  EXPECT_EQ(found.lines, wanted.lines);
+  EXPECT_EQ(found.length, wanted.length);
+  EXPECT_EQ(found.gaps, wanted.gaps);
+  EXPECT_EQ(found.shade, wanted.shade);
+}
+
+// The longest vector is not one of the middles.
+TEST(Middles, ALegendHasTheRangeOfTheField) {
+  data::Dataset dataset = store(100 * samples_bytes);
+  protocol::View view = of_lines(8);
+  view.scalars->clear();
+  view.vector.color.by = protocol::ColorBy::magnitude;
+  const auto longest = static_cast<double>(dataset.volume("wind", 0).value()->range[1]);
+  const auto legend_to = [&](double top) {
+    view.vector.color.range = {0.0, top};
+    const auto completed = completed_of(view);
+    const auto scene = scene::build_scene(completed, dataset).value();
+    EXPECT_EQ(scene.vector->field_stride, 8);
+    EXPECT_LT(scene.vector->field->range[1], 0.999 * longest);
+    annotate::Figure figure;
+    figure.width = 640;
+    figure.height = 480;
+    const annotate::Subject subject{completed, scene, dataset.info()};
+    add_legend(subject, style_of(subject), figure);
+    std::string text;
+    for (const annotate::Item& item : figure.above) {
+      if (const auto* one = std::get_if<annotate::Text>(&item)) text += one->text + '\n';
+    }
+    return text;
+  };
+  EXPECT_NE(legend_to(0.999 * longest).find("less than 0.1 % of the lines"), std::string::npos);
+  EXPECT_EQ(legend_to(1.001 * longest).find("of the lines"), std::string::npos);
 }
 
 TEST(Middles, AnotherResidentPartStandsIn) {
