@@ -45,6 +45,7 @@ Json level_part_json(const LevelPart& part) {
     out["first"] = (*part.box)[0];
     out["count"] = (*part.box)[1];
   }
+  if (part.boxes) out["boxes"] = {{"size", part.boxes->size}, {"count", part.boxes->count}};
   return out;
 }
 

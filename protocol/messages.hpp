@@ -152,11 +152,18 @@ struct PartReport {
   std::int64_t count = 0;
   std::int64_t bytes = 0;
 };
+// Boxes of equal size.
+struct LevelBoxes {
+  std::array<int, 3> size{1, 1, 1};  // samples along each axis
+  int count = 0;
+};
 // Samples of a level of a dataset with stored levels.
 struct LevelPart {
   std::array<int, 3> halvings{0, 0, 0};  // of the axes of the data
   // Indices of the level's first sample and numbers of samples; absent in JSON: all of them.
   std::optional<std::array<std::array<int, 3>, 2>> box;
+  // Of the box these alone; absent in JSON: the whole box.
+  std::optional<LevelBoxes> boxes;
 };
 struct DetailReport {
   LevelPart wanted, drawn;

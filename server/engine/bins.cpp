@@ -213,6 +213,12 @@ void Binner::count_regions(std::size_t row, RegionRow& out) {
     extend(kernel.u, u);
     const std::int64_t positions = bounds.positions();
     const std::size_t region = kept.region(layer * kernels::brick_side, v, u);
+    if (kept.is_left_out(layer * kernels::brick_side, v, u)) {
+      shared.done[region] = 1;
+      counts.samples += positions;
+      counts.culled += positions;
+      continue;
+    }
     const bool blank = kept.blank_regions[region] != 0 || kept.find_blank(layer, v, u);
     const Projected found = project_(pass, box, shared.reach);
     const bool unseen = found.seen.empty();

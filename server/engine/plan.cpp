@@ -55,15 +55,15 @@ kernels::Camera make_camera(const Scene& scene) {
 }
 
 // stride: scene::VectorLayer::field_stride.
-void check_volume(const data::Volume& volume, const Lattice& lattice, int stride = 1) {
-  WINDSPLAT_CHECK(volume.dims == data::strided_box(lattice.held(), stride).count);
+void check_volume(const data::Volume& volume, const data::HeldPart& held, int stride = 1) {
+  WINDSPLAT_CHECK(volume.dims == held.dims(stride));
   WINDSPLAT_CHECK(volume.values.size() ==
                   volume.samples() * static_cast<std::size_t>(volume.components));
 }
 
 void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   const scene::VectorLayer& from = *pass.vector;
-  check_volume(*from.field, scene.lattice, from.field_stride);
+  check_volume(*from.field, held_vectors(from, scene.lattice), from.field_stride);
   kernels::LineStyle& to = pass.kernel.line;
   for (int c = 0; c < 3; ++c) {
     to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
@@ -72,7 +72,7 @@ void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   style_lines(scene, from, depth_origin, to);
   if (from.color_by == scene::LineColor::scalar && !from.streamlets) {
     WINDSPLAT_CHECK(from.color_field != nullptr);
-    check_volume(*from.color_field, scene.lattice);
+    check_volume(*from.color_field, scene.lattice.held_part());
     to.color_values = from.color_field->values.data();
   }
   flatten(from.color, pass.line_rgb);
@@ -136,7 +136,7 @@ void add_medium(const Scene& scene, PassPlan& pass) {
   to.min_optical_depth = std::numeric_limits<float>::max();
   for (std::size_t k = 0; k < pass.scalars.size(); ++k) {
     const scene::ScalarLayer& from = *pass.scalars[k];
-    check_volume(*from.field, scene.lattice);
+    check_volume(*from.field, scene.lattice.held_part());
     flatten_layer(from, pass.layers[k]);
     add_layers(from, pass.layers[k], to);
     to.min_optical_depth = std::min(to.min_optical_depth, bounded(from.min_optical_depth));
@@ -239,14 +239,15 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   plan.slab_depth = std::max(slab_depth_asked(scene), slab_depth_least(scene));
 }
 
-void place_positions(const Scene& scene, int major, const SampleWays& ways, PassPlan& pass) {
+void place_positions(const Scene& scene, int major, const data::Box& held, const SampleWays& ways,
+                     PassPlan& pass) {
   kernels::Pass& to = pass.kernel;
   to.major = major;
   to.u = major == 0 ? 1 : 0;
   to.v = major == 2 ? 1 : 2;
   for (int a = 0; a < 3; ++a) {
     AxisArrays& axis = pass.axis[a];
-    place_axis(scene, a, pass.stride, axis);
+    place_axis(scene, a, pass.stride, held, axis);
     to.cell_max[a] = widest_cell(scene, a, pass.stride, axis);
   }
   to.around = scene.lattice.around;
@@ -263,20 +264,43 @@ void index_middles(const Scene& scene, PassPlan& pass) {
   }
 }
 
+// Of fields that are boxes of a grid. stride: of those that hold the middles of kernels alone.
+void place_boxes(const data::BoxGrid& from, int stride, PassPlan& pass) {
+  const data::BoxGrid grid = data::strided_grid(from, stride);
+  kernels::Pass& to = pass.kernel;
+  for (std::size_t a = 0; a < 3; ++a) {
+    to.step[a] = a == 0 ? 1 : to.step[a - 1] * grid.size[a - 1];
+    to.box_kernels[a] = (from.size[a] - 1) / pass.stride + 1;
+    to.box_counts[a] = grid.count[a];
+    WINDSPLAT_CHECK(grid.count[a] == 1 || to.box_kernels[a] % kernels::brick_side == 0);
+  }
+  pass.box_origins.clear();
+  for (std::size_t n = 0; n < grid.places.size(); ++n) {
+    const data::Box box = grid.box_at(n);
+    std::int64_t origin = grid.places[n] * to.step[2] * grid.size[2];
+    for (std::size_t a = 0; a < 3; ++a) origin -= to.step[a] * box.first[a];
+    pass.box_origins.push_back(origin);
+  }
+  to.box_origins = pass.box_origins.data();
+  pass.box_places = grid.places;
+}
+
 void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,
                  PassPlan& pass) {
   const trace::Segments* const segments =
       pass.vector != nullptr ? pass.vector->streamlets.get() : nullptr;
   const auto& dims = segments != nullptr ? segments->dims : scene.lattice.dims;
   const bool middles = pass.vector != nullptr && pass.vector->field_stride > 1;
-  const data::Box held = segments != nullptr ? data::whole_box(dims)
-                         : middles           ? data::strided_box(scene.lattice.held(), pass.stride)
-                                             : scene.lattice.held();
+  const int field_stride = middles ? pass.stride : 1;
+  const data::HeldPart part =
+      middles ? held_vectors(*pass.vector, scene.lattice) : scene.lattice.held_part();
+  const data::Box held =
+      segments != nullptr ? data::whole_box(dims) : data::strided_box(part.box, field_stride);
   kernels::Pass& to = pass.kernel;
   if (segments != nullptr) {
     place_chains(*segments, pass);
   } else {
-    place_positions(scene, major, ways, pass);
+    place_positions(scene, major, part.box, ways, pass);
     if (middles) index_middles(scene, pass);
   }
   to.step[0] = 1;
@@ -298,6 +322,7 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
                   axis.visit.data()};
     to.dims[a] = dims[a];
   }
+  if (part.grid) place_boxes(*part.grid, field_stride, pass);
   to.compositing = pass.vector != nullptr && pass.vector->combine_or
                        ? kernels::compositing_or
                        : static_cast<int>(scene.compositing);
@@ -348,6 +373,7 @@ void begin_pass(int stride, PassPlan& pass) {
   pass.line_rgb.clear();
   pass.rate_x.clear();
   pass.rate_z.clear();
+  pass.box_places.clear();
   pass.kernel = kernels::Pass{};
 }
 

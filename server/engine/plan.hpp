@@ -65,6 +65,8 @@ struct PassPlan {
   std::vector<float> line_rgb;
   std::vector<float> rate_x, rate_z;
   std::vector<LayerArrays> layers;
+  std::vector<std::int64_t> box_origins;
+  std::vector<int> box_places;  // BoxGrid::places of these boxes; empty: the fields are no grid
   std::array<double, 3> edge_max{};  // curved lattices: the longest edge of a cell along each axis
   kernels::Pass kernel{};            // points into the arrays above
 };

@@ -33,7 +33,7 @@ void add_kernel(const Scene& scene, int a, const AxisKernel& kernel, AxisArrays&
 
 // A slice has one kernel position along its axis, independent of the stride. Of a part, those
 // within it, which are kernels of the whole.
-void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
+void add_kernels(const Scene& scene, int a, int stride, const data::Box& held, AxisArrays& axis) {
   const auto& spacing = scene.lattice.spacing[a];
   if (scene.slice && scene.slice->axis == a) {
     const int sample = scene.slice->sample;
@@ -43,7 +43,6 @@ void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
   }
   const int samples = scene.lattice.drawn(a);
   const auto drawn = std::span(spacing).first(static_cast<std::size_t>(samples));
-  const data::Box held = scene.lattice.held();
   WINDSPLAT_CHECK(held.first[a] % (kernels::brick_side * stride) == 0);
   const int end = std::min(samples, held.first[a] + held.count[a]);
   WINDSPLAT_CHECK(end == samples || end % stride == 0);
@@ -54,9 +53,9 @@ void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
 
 }  // namespace
 
-void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
+void place_axis(const Scene& scene, int a, int stride, const data::Box& held, AxisArrays& axis) {
   clear(axis);
-  add_kernels(scene, a, stride, axis);
+  add_kernels(scene, a, stride, held, axis);
   const int count = static_cast<int>(axis.sample.size());
   visit_order(count, eye_index(scene.camera, a, axis.position), axis.visit);
   for (int first = 0; first < count;) {

@@ -81,15 +81,28 @@ struct SummaryCache::Entry {
   std::uint64_t used = 0;  // frame of the last use
   PassSummaries kept;
 
-  [[nodiscard]] std::size_t bytes() const {
-    return kept.bricks.capacity() * sizeof(KeptSummary) + kept.blank_regions.capacity();
-  }
+  [[nodiscard]] std::size_t bytes() const { return kept.bytes(); }
   [[nodiscard]] bool has_fields_of(const PassPlan& pass) const;
   void reset();
   void begin(const PassPlan& pass);
 };
 
 namespace {
+
+int bricks_of(int positions) { return (positions + kernels::brick_side - 1) / kernels::brick_side; }
+
+// The bricks of a pass; of a grid of boxes those of the boxes that it holds.
+std::size_t summaries_of(const PassPlan& pass) {
+  const kernels::Pass& kernel = pass.kernel;
+  const bool is_grid = !pass.box_places.empty();
+  std::size_t bricks =
+      is_grid ? *std::max_element(pass.box_places.begin(), pass.box_places.end()) + 1U : 1U;
+  for (int a = 0; a < 3; ++a) {
+    const int positions = is_grid ? kernel.box_kernels[a] : kernel.axis[a].count;
+    bricks *= static_cast<std::size_t>(a == kernel.major ? positions : bricks_of(positions));
+  }
+  return bricks;
+}
 
 template <class Visit>
 void each_field(const PassPlan& pass, const Visit& visit) {
@@ -123,17 +136,31 @@ void SummaryCache::Entry::begin(const PassPlan& pass) {
     fields.emplace_back(field);
     volumes.push_back(field.get());
   });
+  kept.begin(pass);
+}
+
+std::size_t PassSummaries::bytes() const {
+  return bricks.capacity() * sizeof(KeptSummary) + blank_regions.capacity() +
+         places.capacity() * sizeof(int);
+}
+
+void PassSummaries::begin(const PassPlan& pass) {
   const kernels::Pass& kernel = pass.kernel;
-  const auto bricks = [](int positions) {
-    return (positions + kernels::brick_side - 1) / kernels::brick_side;
-  };
-  kept.u_bricks = bricks(kernel.axis[kernel.u].count);
-  kept.v_bricks = bricks(kernel.axis[kernel.v].count);
-  kept.layers = kernel.axis[kernel.major].count;
-  kept.regions = bricks(kept.layers);
-  const std::size_t rows = static_cast<std::size_t>(kept.u_bricks) * kept.v_bricks;
-  kept.bricks.assign(rows * kept.layers, KeptSummary());
-  kept.blank_regions.assign(rows * kept.regions, 0);
+  const auto along = [&](int a) { return bricks_of(kernel.axis[a].count); };
+  u_bricks = along(kernel.u);
+  v_bricks = along(kernel.v);
+  layers = kernel.axis[kernel.major].count;
+  regions = along(kernel.major);
+  places = pass.box_places;
+  if (!places.empty()) {
+    const std::array<int, 3> steps{1, kernel.box_counts[0],
+                                   kernel.box_counts[0] * kernel.box_counts[1]};
+    box = {kernel.box_kernels[kernel.major], bricks_of(kernel.box_kernels[kernel.v]),
+           bricks_of(kernel.box_kernels[kernel.u])};
+    box_step = {steps[kernel.major], steps[kernel.v], steps[kernel.u]};
+  }
+  bricks.assign(summaries_of(pass), KeptSummary());
+  blank_regions.assign(static_cast<std::size_t>(u_bricks) * v_bricks * regions, 0);
 }
 
 bool PassSummaries::find_blank(int region_layer, int v, int u) {
@@ -190,12 +217,7 @@ PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& tabl
   }
   Entry& entry = replaceable();
   entry.used = frame_;
-  std::size_t bricks = 1;
-  for (int a = 0; a < 3; ++a) {
-    const auto positions = static_cast<std::size_t>(pass.kernel.axis[a].count);
-    bricks *= a == pass.kernel.major ? positions : (positions + kernels::brick_side - 1) / 8;
-  }
-  const std::size_t needed = bricks * sizeof(KeptSummary);
+  const std::size_t needed = summaries_of(pass) * sizeof(KeptSummary);
   // Release the storage of an entry that is far too large.
   if (entry.bytes() > 4 * needed + 65536) {
     entry.reset();

@@ -3,6 +3,7 @@
 // 16 bytes per brick of 64 kernel positions.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -38,15 +39,33 @@ struct PassSummaries {
   int v_bricks = 0;
   int layers = 0;   // kernel positions along the major axis
   int regions = 0;  // along the major axis
+  // Of fields that are boxes of a grid, which have no summaries of what is left out: layers and
+  // bricks of a box along major, v and u, the steps between its boxes in `places`, and the places.
+  std::array<int, 3> box{1, 1, 1};
+  std::array<int, 3> box_step{0, 0, 0};
+  std::vector<int> places;  // 0: left out; empty: the fields are no grid
   std::vector<KeptSummary> bricks;
   std::vector<std::uint8_t> blank_regions;  // 1: every brick is known to be blank
 
   [[nodiscard]] std::size_t brick(int layer, int v, int u) const {
-    return (static_cast<std::size_t>(layer) * v_bricks + v) * u_bricks + u;
+    if (places.empty()) return (static_cast<std::size_t>(layer) * v_bricks + v) * u_bricks + u;
+    const auto place = static_cast<std::size_t>(place_of(layer, v, u));
+    return ((place * box[0] + layer % box[0]) * box[1] + v % box[1]) * box[2] + u % box[2];
+  }
+  // Whether the fields have nothing there.
+  [[nodiscard]] bool is_left_out(int layer, int v, int u) const {
+    return !places.empty() && place_of(layer, v, u) == 0;
+  }
+  [[nodiscard]] int place_of(int layer, int v, int u) const {
+    return places[static_cast<std::size_t>(layer / box[0] * box_step[0] + v / box[1] * box_step[1] +
+                                           u / box[2] * box_step[2])];
   }
   [[nodiscard]] std::size_t region(int layer, int v, int u) const {
-    return brick(layer / kernels::brick_side, v, u);
+    return (static_cast<std::size_t>(layer / kernels::brick_side) * v_bricks + v) * u_bricks + u;
   }
+  [[nodiscard]] std::size_t bytes() const;
+  // Empty summaries of a pass.
+  void begin(const PassPlan& pass);
   // Tests the bricks of a region and records the result in blank_regions.
   bool find_blank(int region_layer, int v, int u);
 };

@@ -89,13 +89,9 @@ class Sampling {
         const double within = pcg3d({static_cast<std::uint32_t>(n), 17, 29})[0] / 4294967296.0;
         at = std::min(samples_.count() - 1, static_cast<std::int64_t>((n + within) * each()));
       }
-      Index i{};
-      for (std::size_t a = 0; a < 3; ++a) {
-        const std::int64_t wide = samples_.high()[a] - samples_.low()[a];
-        i[a] = samples_.low()[a] + static_cast<int>(at % wide);
-        at /= wide;
-      }
-      if (auto one = project(i)) out.push_back(*one);
+      const auto i = samples_.at(at);
+      if (!i) continue;
+      if (auto one = project(*i)) out.push_back(*one);
     }
     std::sort(out.begin(), out.end(), [](const Seen& a, const Seen& b) {
       const auto place = [](const Seen& one) {

@@ -97,7 +97,7 @@ class Counting {
       const bool one = slice && slice->axis == static_cast<int>(a);
       samples_[a] = one ? 1.0 : data::halved(lattice_.dims[a], part.halvings[a]);
       cell_[a] = scene::cell_size(lattice_, a) * std::exp2(part.halvings[a]);
-      if (part.box) hold_part(a, part);
+      if (part.held) hold_part(a, part);
     }
     visible_.share = std::min(visible_.share, 1.0);
   }
@@ -140,7 +140,7 @@ class Counting {
   // Of a part a larger share is visible.
   void hold_part(std::size_t a, const scene::DrawnPart& part) {
     const double whole = samples_[a];
-    samples_[a] = part.box->count[a];
+    samples_[a] = part.held->box.count[a];
     data_[a] = std::min<double>(data_[a], std::ldexp(samples_[a], part.halvings[a]));
     visible_.share *= whole / samples_[a];
   }

@@ -18,13 +18,43 @@ DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene) {
     low_[axis] = scene.slice->sample;
     high_[axis] = scene.slice->sample + 1;
   }
+  if (scene.lattice.part && scene.lattice.part->grid) {
+    const data::BoxGrid& grid = *scene.lattice.part->grid;
+    boxes_ = grid.boxes();
+    count_ = static_cast<std::int64_t>(boxes_.size());
+    for (const int n : grid.size) count_ *= n;
+    return;
+  }
   for (std::size_t a = 0; a < 3; ++a) count_ *= high_[a] - low_[a];
+}
+
+std::optional<Index> DrawnSamples::at(std::int64_t n) const {
+  Index i{};
+  if (boxes_.empty()) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::int64_t wide = high_[a] - low_[a];
+      i[a] = low_[a] + static_cast<int>(n % wide);
+      n /= wide;
+    }
+    return i;
+  }
+  const auto& size = scene_.lattice.part->grid->size;
+  for (std::size_t a = 0; a < 3; ++a) {
+    i[a] = static_cast<int>(n % size[a]);
+    n /= size[a];
+  }
+  const data::Box& box = boxes_[static_cast<std::size_t>(n)];
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (i[a] >= box.count[a]) return std::nullopt;
+    i[a] += box.first[a];
+  }
+  return i;
 }
 
 std::size_t DrawnSamples::number(const Index& i) const { return scene_.lattice.number_of(i); }
 
 std::size_t DrawnSamples::vector_number(const Index& i) const {
-  return scene_.lattice.number_of(i, scene_.vector->field_stride);
+  return scene::vector_number(*scene_.vector, scene_.lattice, i);
 }
 
 glm::dvec3 DrawnSamples::place(const Index& i) const {
@@ -42,6 +72,10 @@ std::optional<Index> DrawnSamples::neighbour(const Index& i, std::size_t a, int 
   Index next = i;
   next[a] += step;
   if (next[a] < low_[a] || next[a] >= high_[a]) return std::nullopt;
+  const auto& part = scene_.lattice.part;
+  if (part && part->grid && part->grid->places[part->grid->index_of(next)] == 0) {
+    return std::nullopt;
+  }
   return next;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <vector>
 
 #include "server/engine/reference/kernels.hpp"
 #include "server/scene/scene.hpp"
@@ -57,7 +58,10 @@ class DrawnSamples {
   explicit DrawnSamples(const scene::Scene& scene);
 
   [[nodiscard]] const scene::Scene& scene() const { return scene_; }
+  // Of a grid of boxes, those beyond the end of the data count too.
   [[nodiscard]] std::int64_t count() const { return count_; }
+  // The n-th of these; nullopt: it lies beyond the end of the data.
+  [[nodiscard]] std::optional<Index> at(std::int64_t n) const;
   // Indices of the first sample and of the one after the last; those of a slice are its layer, of a
   // part those that it holds.
   [[nodiscard]] const Index& low() const { return low_; }
@@ -84,6 +88,7 @@ class DrawnSamples {
   Index low_{0, 0, 0};
   Index high_{0, 0, 0};
   std::int64_t count_ = 1;
+  std::vector<data::Box> boxes_;  // empty: the scene has all samples of a box
 };
 
 }  // namespace windsplat::frame

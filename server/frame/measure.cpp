@@ -26,8 +26,9 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t channels = 4;
 
 double samples_of(const scene::Lattice& lattice) {
+  if (lattice.part) return static_cast<double>(lattice.part->samples());
   double samples = 1;
-  for (const int n : lattice.held().count) samples *= n;
+  for (const int n : lattice.dims) samples *= n;
   return samples;
 }
 

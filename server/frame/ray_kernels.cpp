@@ -191,8 +191,9 @@ void RayKernels::find_path(const Group& group, const Index& near, const PictureR
   Index start{};
   for (std::size_t a = 0; a < 3; ++a) {
     const bool sliced = scene_.slice && static_cast<std::size_t>(scene_.slice->axis) == a;
-    const int in_part = near[a] - samples_.low()[a];
-    start[a] = sliced ? 0 : std::min(in_part / group.layers->stride, group.count(a) - 1);
+    const int first = sliced ? 0 : group.layers->axis[a].front().sample / group.layers->stride;
+    const int kernel = near[a] / group.layers->stride - first;
+    start[a] = sliced ? 0 : std::min(kernel, group.count(a) - 1);
   }
   const reference::KernelPosition here = position(group, start);
   if (!here.has_cell) return;

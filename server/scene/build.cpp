@@ -116,8 +116,8 @@ struct Fields {
   const data::Dataset& dataset;
   const CompletedView& completed;
   data::Coarsening coarsening;
-  std::optional<data::Box> box;  // of samples of the level; nullopt: all
-  const Section* section;        // null: the samples of the data
+  std::optional<data::HeldPart> part;  // of the samples of the level; nullopt: all
+  const Section* section;              // null: the samples of the data
   [[nodiscard]] Needed of_medium(const std::string& name) const {
     return find({name, coarsening}, kept_of(name, protocol::FilterOf::media));
   }
@@ -136,8 +136,8 @@ struct Fields {
     return dataset.info().find(name)->components.size();
   }
   [[nodiscard]] Needed find(const ShownField& shown, const data::Derivation& kept) const {
-    const auto& [name, how, middles] = shown;
-    if (box) return {name, part_of_field(dataset, shown, *box).value()};
+    const auto& [name, how, middles, all] = shown;
+    if (part) return {name, part_of_field(dataset, shown, *part).value()};
     if (section == nullptr) {
       // What a region keeps is not what is stored.
       auto stored = kept.variant.empty() ? dataset.stored_reduction(name, how) : std::nullopt;
@@ -226,6 +226,7 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
     const ShownField shown =
         lines_at(view, fields.coarsening, fields.completed.lattice(), fields.dataset);
     if (shown.middles) layer.field_stride = layer.stride;
+    layer.holds_all = shown.all;
     lines.vectors = fields.of_lines(shown);
   }
   return lines;
@@ -257,7 +258,7 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const DrawnPart
     section->owner = placed;
     needed.section = std::move(*section);
   }
-  const Fields fields{dataset, completed, coarsening_of(placed->lattice, part.halvings), part.box,
+  const Fields fields{dataset, completed, coarsening_of(placed->lattice, part.halvings), part.held,
                       needed.section ? &*needed.section : nullptr};
   if (shows_lines(view)) {
     auto lines = needed_lines(view, *placed, fields);
@@ -305,9 +306,9 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
     media.push_back(values.field + '\n' + std::to_string(step) + '\n' + values.how.variant);
   }
   if (!needed.section) {
-    const auto box = scene.lattice.part;
+    const auto part = scene.lattice.part;
     scene.lattice = coarsen_lattice(whole, scene.level);
-    scene.lattice.part = box;
+    scene.lattice.part = part;
     if (auto lit = light::light_scene(completed.view(), media, dataset, scene); !lit) {
       return lit.error();
     }
@@ -349,7 +350,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
     }
   }
   scene.level = part.halvings;
-  scene.lattice.part = part.box;
+  scene.lattice.part = part.held;
   if (dataset.info().stored != nullptr) scene.wanted_level = part.wanted;
   auto needed = needed_scene(completed, part, dataset);
   if (!needed) return needed.error();

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/data/model/box.hpp"
+#include "server/data/model/box_grid.hpp"
 #include "server/data/model/middles.hpp"
 #include "server/data/model/volume.hpp"
 #include "server/ground/paint.hpp"
@@ -68,21 +69,22 @@ struct Lattice {
   // The samples of which fields hold values, where these are a part of the lattice
   // (scene/level/parts.hpp): whatever is drawn elsewhere lies beyond the picture. Everything else
   // describes the whole lattice, so that a picture does not depend on the part. nullopt: all.
-  std::optional<data::Box> part;
-  [[nodiscard]] data::Box held() const { return part ? *part : data::whole_box(dims); }
-  // Number of a sample in the fields, x fastest. stride: of fields that hold the middles of kernels
-  // alone (VectorLayer::field_stride), the number of the kernel that the sample belongs to.
-  [[nodiscard]] std::size_t number_of(const std::array<int, 3>& sample, int stride = 1) const;
+  std::optional<data::HeldPart> part;
+  [[nodiscard]] data::Box held() const { return part ? part->box : data::whole_box(dims); }
+  // The same of fields that hold all samples too.
+  [[nodiscard]] data::HeldPart whole() const { return {data::whole_box(dims), nullptr}; }
+  [[nodiscard]] data::HeldPart held_part() const { return part ? *part : whole(); }
+  // Number of a sample in the fields, x fastest; of vectors see vector_number().
+  [[nodiscard]] std::size_t number_of(const std::array<int, 3>& sample) const;
   // Number of samples along an axis that are drawn, unless it is that of a slice.
   [[nodiscard]] int drawn(int axis) const { return axis == 0 && around > 0 ? around : dims[axis]; }
 };
 
-inline std::size_t Lattice::number_of(const std::array<int, 3>& sample, int stride) const {
-  const data::Box kernels = data::strided_box(held(), stride);
+inline std::size_t Lattice::number_of(const std::array<int, 3>& sample) const {
+  if (part) return part->number_of(sample);
   std::size_t number = 0;
   for (std::size_t a = 3; a-- > 0;) {
-    number = number * static_cast<std::size_t>(kernels.count[a]) +
-             static_cast<std::size_t>(sample[a] / stride - kernels.first[a]);
+    number = number * static_cast<std::size_t>(dims[a]) + static_cast<std::size_t>(sample[a]);
   }
   return number;
 }
@@ -144,6 +146,8 @@ struct VectorLayer {
   // rectilinear lattice without a slice and light, whose stride no medium has, and which no other
   // field colours.
   int field_stride = 1;
+  // Whether it then holds the middles of all kernels, also where the lattice has a part.
+  bool holds_all = false;
   // Curved lines in place of straight ones, of all kernel positions; null: straight lines. Their
   // values of colour lie in the range of `color`, scaled like their magnitudes by a power of two.
   std::shared_ptr<const trace::Segments> streamlets;
@@ -212,6 +216,18 @@ constexpr double full_factor = 65535;
 // sunlight that arrives at each sample and is scattered towards the eye; gradient: by a factor for
 // each sample that follows from the gradient of the field; none: nothing.
 enum class Shading { scatter, gradient, none };
+
+// What of the lattice the field of the layer holds.
+inline data::HeldPart held_vectors(const VectorLayer& layer, const Lattice& lattice) {
+  return layer.holds_all ? lattice.whole() : lattice.held_part();
+}
+
+// Number in the field of the layer of the vector at a sample, or of its kernel.
+inline std::size_t vector_number(const VectorLayer& layer, const Lattice& lattice,
+                                 const std::array<int, 3>& sample) {
+  if (layer.field_stride == 1) return lattice.number_of(sample);
+  return held_vectors(layer, lattice).number_of(sample, layer.field_stride);
+}
 
 struct ScalarLayer {
   std::shared_ptr<const data::Volume> field;

@@ -285,6 +285,11 @@ test("the HUD names the level and the part of a store that are drawn, and the le
     detailLine({ detail: { wanted, drawn: { ...level(0), ...part } } }),
     "full detail · part of 64 x 128 x 64 samples",
   );
+  const boxes = { size: [64, 64, 64] as [number, number, number], count: 2 };
+  assert.equal(
+    detailLine({ detail: { wanted, drawn: { ...level(0), ...part, boxes } } }),
+    "full detail · part of 2 boxes within 64 x 128 x 64 samples",
+  );
   assert.equal(
     detailLine({ detail: { wanted: level(1), drawn: { ...level(2), ...part } } }),
     "level 2,2,2 · part of 64 x 128 x 64 samples · wanted level 1,1,1",

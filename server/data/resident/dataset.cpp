@@ -185,18 +185,33 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   if (!index) return index.error();
   const ResidentKey key{state_->owner, *index, step, variant_of(how.variant, step)};
   if (manner_ == Manner::resident_only) {
-    return state_->had(state_->budget->find_now(key), *index, step, how.stored);
+    auto there = state_->had(state_->budget->find_now(key), *index, step);
+    if (there) state_->budget->bricks().had(bricks_in(state_->info, *index, how));
+    return there;
   }
-  if (const auto there = state_->budget->find(key)) {
-    if (*there && how.stored) {
-      state_->budget->bricks().had(bricks_of(state_->info, *index, *how.stored));
-    }
+  // A gathering that another caller cancelled begins again.
+  const auto is_to_be_repeated = [&](const Result<Resident>& answer) {
+    return how.gathered && !answer && answer.error().kind == ErrorKind::cancelled &&
+           !cancellation().cancelled();
+  };
+  auto there = state_->budget->find(key);
+  while (there && is_to_be_repeated(*there)) there = state_->budget->find(key);
+  if (there) {
+    if (*there) state_->budget->bricks().had(bricks_in(state_->info, *index, how));
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
   if (how.stored) {
     return as_volume(
         get(key, how.bytes, [&] { return state_->read(*index, step, urgency(), &*how.stored); }));
+  }
+  if (how.gathered) {
+    const auto make = [&] {
+      return guarded(state_->info.fields[*index], [&] { return gather(*index, step, how); });
+    };
+    auto answer = get(key, how.bytes, make);
+    while (is_to_be_repeated(answer)) answer = get(key, how.bytes, make);
+    return as_volume(answer);
   }
   // Keep references, so that no volume is evicted before the result is computed from it.
   std::vector<VolumePtr> others;

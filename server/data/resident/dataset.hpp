@@ -13,6 +13,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/model/box.hpp"
+#include "server/data/model/box_grid.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/model/stored.hpp"
@@ -25,6 +26,8 @@ enum class Storage {
   float32,
   packed16,  // 16 bits per value, unpacked for rendering (packed.hpp)
 };
+
+struct GatheredBoxes;
 
 // A volume that is computed from a field at a step; by default the field itself.
 struct Derivation {
@@ -44,6 +47,16 @@ struct Derivation {
       make_with = nullptr;
   // The source has the result stored: it is read, and neither made nor are its inputs loaded.
   std::optional<StoredPart> stored = std::nullopt;
+  // The result is that of a grid of boxes, each of which is read, made or, from what is resident,
+  // copied.
+  std::shared_ptr<const GatheredBoxes> gathered = nullptr;
+};
+
+struct GatheredBoxes {
+  BoxGrid grid;  // the variant of the whole ends with its key
+  // What yields the n-th of BoxGrid::boxes(): stored, or made from what is stored. Their variants
+  // are those of the whole, and end with the keys of their boxes.
+  std::function<Derivation(std::size_t n)> part;
 };
 
 // One opened dataset. A handle: copies refer to the same dataset. Thread-safe.
@@ -94,9 +107,10 @@ class Dataset {
   [[nodiscard]] std::optional<Derivation> stored_reduction(const std::string& field,
                                                            const Coarsening& how) const;
   [[nodiscard]] bool has(const std::string& field, std::size_t step, const Derivation& how) const;
-  // Boxes of which what `how` yields of `box` is resident, as their variants end with their keys.
-  [[nodiscard]] std::vector<Box> resident_boxes(const std::string& field, std::size_t step,
-                                                const Derivation& how, const Box& box) const;
+  // Boxes, and grids of boxes, of which what `how` yields of `box` is resident, as their variants
+  // end with their keys.
+  [[nodiscard]] std::vector<HeldPart> resident_parts(const std::string& field, std::size_t step,
+                                                     const Derivation& how, const Box& box) const;
   // Bytes of what a reduction of a field is computed from: by stored_reduction(), or by reduction()
   // if there is none.
   [[nodiscard]] std::uint64_t bytes_beside_level(const std::string& field,
@@ -258,6 +272,8 @@ class Dataset {
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, const Budget::Make& make);
   // The dataset that is subtracted.
   [[nodiscard]] Dataset other() const;
+  // The boxes of a derivation that has them.
+  Result<Volume> gather(std::size_t field, std::size_t step, const Derivation& how);
   Result<std::shared_ptr<const Volume>> inputs(const std::string& field, std::size_t step,
                                                const Derivation& how,
                                                std::vector<std::shared_ptr<const Volume>>& others);

@@ -31,6 +31,20 @@ inline Result<std::shared_ptr<const Volume>> as_volume(const Result<Resident>& k
   return std::static_pointer_cast<const Volume>(*kept);
 }
 
+// Bricks of what is stored of a derivation itself.
+inline std::uint64_t bricks_in(const DatasetInfo& info, std::size_t field, const Derivation& how) {
+  if (how.stored) return bricks_of(info, field, *how.stored);
+  if (!how.gathered) return 0;
+  auto part = how.gathered->part(0).stored;
+  if (!part) return 0;
+  std::uint64_t bricks = 0;
+  for (const Box& box : how.gathered->grid.boxes()) {
+    part->box = box;
+    bricks += bricks_of(info, field, *part);
+  }
+  return bricks;
+}
+
 // Runs a function that makes a volume; exceptions become errors.
 template <class Make>
 Result<Resident> guarded(const FieldInfo& field, const Make& make) {

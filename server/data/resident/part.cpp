@@ -81,16 +81,20 @@ bool Dataset::has(const std::string& field, std::size_t step, const Derivation& 
   return key && state_->budget->has(*key);
 }
 
-std::vector<Box> Dataset::resident_boxes(const std::string& field, std::size_t step,
-                                         const Derivation& how, const Box& box) const {
+std::vector<HeldPart> Dataset::resident_parts(const std::string& field, std::size_t step,
+                                              const Derivation& how, const Box& box) const {
   auto key = key_of(field, step, how);
   const std::string ending = data::key_of(box);
   if (!key || !how.variant.ends_with(ending)) return {};
   std::string& variant = std::get<3>(*key);
   variant.resize(variant.size() - ending.size());
-  std::vector<Box> out;
+  std::vector<HeldPart> out;
   for (const std::string& one : state_->budget->endings_of(*key)) {
-    if (const auto there = box_of(one)) out.push_back(*there);
+    if (const auto there = box_of(one)) out.push_back({*there, nullptr});
+    if (auto there = grid_of_key(one)) {
+      const Box bounds = there->bounds;
+      out.push_back({bounds, std::make_shared<const BoxGrid>(std::move(*there))});
+    }
   }
   return out;
 }

@@ -396,10 +396,13 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& u = pass.axis[pass.u];
   const Axis& v = pass.axis[pass.v];
   const Axis& major = pass.axis[pass.major];
-  const std::int64_t sheet =
-      pass.origin + pass.step[pass.major] * major.field_index[major.visit[brick.sheet]];
-  const std::int64_t first =
-      sheet + pass.step[pass.u] * u.field_index[lowest(u.visit + brick.u_first)];
+  int kernel[3];
+  kernel[pass.major] = major.visit[brick.sheet];
+  kernel[pass.u] = lowest(u.visit + brick.u_first);
+  kernel[pass.v] = lowest(v.visit + brick.v_first);
+  const std::int64_t first = origin_at(pass, kernel) +
+                             pass.step[pass.major] * major.field_index[kernel[pass.major]] +
+                             pass.step[pass.u] * u.field_index[kernel[pass.u]];
   for (int j = 0; j < brick.v_count; ++j) {
     const std::int64_t at = first + pass.step[pass.v] * v.field_index[v.visit[brick.v_first + j]];
     if (brick.lines != 0) {

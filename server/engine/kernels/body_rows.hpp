@@ -22,6 +22,7 @@ struct Rows {
   alignas(64) std::int32_t sample[3][pair_kernels];
   std::int32_t group[3][pair_kernels];
   std::int64_t along_u[brick_side];
+  std::int64_t origin;     // of the box of the brick (Pass::box_origins)
   std::int64_t offset[2];  // offset of the first sample of each row in the fields
   int u_count, v_count, pairs;
   int there;        // number of valid rows of the pair
@@ -67,6 +68,16 @@ KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const IndexOf& index
 // eye.
 inline int lowest(const int* visit) { return visit[0] / brick_side * brick_side; }
 
+// The origin of the fields at a kernel position, which is that of its whole brick.
+inline std::int64_t origin_at(const Pass& pass, const int (&kernel)[3]) {
+  if (pass.box_origins == nullptr) return pass.origin;
+  std::int64_t box = 0;
+  for (int a = 2; a >= 0; --a) {
+    box = box * pass.box_counts[a] + kernel[a] / pass.box_kernels[a];
+  }
+  return pass.box_origins[box];
+}
+
 void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   const Axis& u = pass.axis[pass.u];
   const int count = brick.u_count;
@@ -76,6 +87,7 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.first[pass.u] = lowest(u.visit + brick.u_first);
   rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first);
   rows.first[pass.major] = pass.axis[pass.major].visit[brick.sheet];
+  rows.origin = origin_at(pass, rows.first);
   const int first = rows.first[pass.u];
   if (count == brick_side) {
     fill_along(pass, rows, [first](int i) { return first + i; });
@@ -112,7 +124,7 @@ void set_pair(const Pass& pass, int pair, Rows& rows) {
     return pass.step[a] * pass.axis[a].field_index[index];
   };
   const std::int64_t first =
-      pass.origin + along(pass.major, rows.first[pass.major]) + along(pass.u, rows.first[pass.u]);
+      rows.origin + along(pass.major, rows.first[pass.major]) + along(pass.u, rows.first[pass.u]);
   rows.offset[0] = first + along(pass.v, rows.first[pass.v] + 2 * pair);
   rows.offset[1] = first + along(pass.v, rows.first[pass.v] + second);
 }

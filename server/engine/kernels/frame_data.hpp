@@ -204,6 +204,11 @@ struct Pass {
   int major, u, v;       // sheets are stacked along major; u is innermost
   std::int64_t step[3];  // offset between neighbours along each axis of the fields, in samples
   std::int64_t origin;   // offset of index 0 in the fields: not above 0, as they may be of a part
+  // Of fields that are boxes of a grid (data/model/box_grid.hpp), the origin of each of its boxes,
+  // x fastest, in place of that above; the steps are those within a box. null: they are not.
+  const std::int64_t* box_origins;
+  int box_kernels[3];  // kernel positions of a box along each axis: multiples of brick_side
+  int box_counts[3];
   int has_lines;
   int has_medium;
   LineStyle line;

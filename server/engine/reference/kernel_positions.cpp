@@ -104,13 +104,13 @@ View make_view(const scene::Camera& camera) {
   return view;
 }
 
-std::vector<AxisPosition> axis_positions(const Scene& scene, int axis, int stride) {
+std::vector<AxisPosition> axis_positions(const Scene& scene, int axis, int stride,
+                                         const data::Box& held) {
   const auto& spacing = scene.lattice.spacing[axis];
   if (scene.slice && scene.slice->axis == axis) {
     const int sample = scene.slice->sample;
     return {{sample, 1, spacing[sample]}};
   }
-  const data::Box held = scene.lattice.held();
   const int dim = scene.lattice.drawn(axis);
   const int end = std::min(dim, held.first[axis] + held.count[axis]);
   std::vector<AxisPosition> positions;
@@ -133,7 +133,10 @@ std::vector<LayerGroup> group_layers(const Scene& scene) {
     same->media.push_back(&layer);
   }
   for (LayerGroup& group : groups) {
-    for (int a = 0; a < 3; ++a) group.axis[a] = axis_positions(scene, a, group.stride);
+    const bool lines = group.lines != nullptr;
+    const data::Box held = lines ? scene::held_vectors(*group.lines, scene.lattice).box
+                                 : scene.lattice.held_part().box;
+    for (int a = 0; a < 3; ++a) group.axis[a] = axis_positions(scene, a, group.stride, held);
   }
   return groups;
 }

@@ -55,7 +55,8 @@ struct AxisPosition {
   int samples = 1;
   double cell = 0;
 };
-std::vector<AxisPosition> axis_positions(const scene::Scene& scene, int axis, int stride);
+std::vector<AxisPosition> axis_positions(const scene::Scene& scene, int axis, int stride,
+                                         const data::Box& held);
 
 // Layers of one stride share their kernel positions.
 struct LayerGroup {

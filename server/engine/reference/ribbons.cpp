@@ -55,7 +55,7 @@ std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& la
   Vec data{};
   const std::size_t number = layer.field_stride == 1
                                  ? position.index
-                                 : scene.lattice.number_of(position.sample, layer.field_stride);
+                                 : scene::vector_number(layer, scene.lattice, position.sample);
   for (int c = 0; c < layer.field->components; ++c) {
     data[c] = static_cast<double>(layer.field->component(c)[number]);
   }

@@ -190,8 +190,7 @@ class PixelLight {
     if (hit.opacity <= 0) return;
     one.at = {0.5 * (line->x0 + line->x1), 0.5 * (line->y0 + line->y1)};
     const scene::VectorLayer& layer = *one.group->lines;
-    one.value =
-        magnitude_at(*layer.field, scene_.lattice.number_of(one.sample, layer.field_stride));
+    one.value = magnitude_at(*layer.field, scene::vector_number(layer, scene_.lattice, one.sample));
     keep_line(hit, one);
   }
 

@@ -114,8 +114,16 @@ quality::LevelDifferences means_of(const Values& near, const Values& far, const 
 
 std::optional<protocol::DetailReport> data_drawn(const scene::Scene& scene) {
   if (!scene.wanted_level) return std::nullopt;
-  protocol::DetailReport out{{*scene.wanted_level, {}}, {scene.level, {}}, {}, scene.missing_bytes};
-  if (const auto& part = scene.lattice.part) out.drawn.box = std::array{part->first, part->count};
+  protocol::DetailReport out;
+  out.wanted.halvings = *scene.wanted_level;
+  out.drawn.halvings = scene.level;
+  out.missing_bytes = scene.missing_bytes;
+  if (const auto& part = scene.lattice.part) {
+    out.drawn.box = std::array{part->box.first, part->box.count};
+    if (const auto& grid = part->grid) {
+      out.drawn.boxes = protocol::LevelBoxes{grid->size, grid->held};
+    }
+  }
   return out;
 }
 

@@ -77,7 +77,13 @@ ShownField lines_at(const View& view, const data::Coarsening& how, const Lattice
                     const data::Dataset& dataset) {
   ShownField lines{view.vector.field.name, drawn(how, view)};
   if (how.halvings == std::array{0, 0, 0} && may_use_middles(view, lattice, dataset)) {
-    return {lines.field, data::middles_of(lines.coarsening.stride), true};
+    constexpr double share_max = 0.1;  // of the memory, of middles that are all held
+    const data::Coarsening middles = data::middles_of(lines.coarsening.stride);
+    const auto bytes = static_cast<double>(dataset.level_bytes(lines.field, middles));
+    const bool all =
+        std::any_of(view.scalars->begin(), view.scalars->end(), absorbs) &&
+        dataset.fits_beside_boxes(static_cast<std::uint64_t>(bytes / share_max), {lines.field});
+    return {lines.field, middles, true, all};
   }
   return lines;
 }
@@ -110,7 +116,7 @@ bool are_within_limit(const std::vector<ShownField>& shown, const View& view,
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
   std::uint64_t largest = 0;
-  for (const auto& [field, how, middles] : shown) {
+  for (const auto& [field, how, middles, all] : shown) {
     if (!counted.emplace(field, how.reduction).second) continue;
     const std::size_t components = dataset.info().find(field)->components.size();
     levels += level_bytes(lattice, components, how);
@@ -177,11 +183,11 @@ class Choice {
     const DrawnPart all{full, std::nullopt, level};
     if (!may_use_stored(view_, lattice_, dataset_)) return all;
     if (all_detail_fits(shown(full), dataset_)) return all;
-    if (!may_merge(view_)) return {full, box(full), full};
+    if (!may_merge(view_)) return {full, held(full), full};
     if (is_drawn_in_full(view_) && has_strided_lines(view_)) {
       const ShownField lines = shown(full).front();
       if (lines.middles) {
-        if (auto of_middles = box(full)) return {full, of_middles, full};
+        if (auto of_middles = held(full)) return {full, of_middles, full};
       }
       // At these levels the lines are the same.
       while (2 << level[0] <= *view_.vector.stride) {
@@ -205,9 +211,9 @@ class Choice {
     return are_within_limit(shown(level), view_, lattice_, dataset_);
   }
 
-  [[nodiscard]] std::optional<data::Box> box(const std::array<int, 3>& level) const {
+  [[nodiscard]] std::optional<data::HeldPart> held(const std::array<int, 3>& level) const {
     if (!may_use_part(view_)) return std::nullopt;
-    return box_for(view_, camera_, lattice_, level, shown(level), dataset_);
+    return part_for(view_, camera_, lattice_, level, shown(level), dataset_);
   }
 
   // The coarsest stored level of which no axis is halved more often than in `level`, or the first
@@ -223,10 +229,10 @@ class Choice {
     const std::array<int, 3> wanted = levels[n];
     for (; n < levels.size(); ++n) {
       if (n > 0 && fits(levels[n])) return {levels[n], std::nullopt, wanted};
-      if (auto of_level = box(levels[n])) return {levels[n], of_level, wanted};
+      if (auto of_level = held(levels[n])) return {levels[n], of_level, wanted};
     }
     // Lines that are not stored at coarser levels.
-    if (auto of_samples = box(levels.front())) return {levels.front(), of_samples, wanted};
+    if (auto of_samples = held(levels.front())) return {levels.front(), of_samples, wanted};
     return {levels.back(), std::nullopt, wanted};
   }
 

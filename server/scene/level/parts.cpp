@@ -30,6 +30,10 @@ constexpr int brick_kernels = 8;  // along an axis: of the bricks that the engin
 constexpr std::array full{0, 0, 0};
 // Of the memory limit: the parts before and after a change of the camera exist at the same time.
 constexpr double part_share_max = 0.45;
+// Beyond this the requests to a loader would take most of the time.
+constexpr int boxes_max = 2048;
+// Boxes within the bounds of a grid, held or not, which are visited for every picture.
+constexpr std::size_t places_max = std::size_t{1} << 18;
 
 int halved_stride(const View& view, int halvings) {
   const int stride = view.vector.stride.value_or(1);
@@ -93,7 +97,7 @@ Reach reach_of(const View& view, const Camera& camera, const Lattice& whole,
 // Boxes of units along each axis: the first, and the one after the last.
 using Units = std::array<std::array<int, 2>, 3>;
 
-// Finds the bounds of the units of samples in sight, dividing boxes that are not within them yet.
+// Finds the units of samples in sight, dividing boxes of them.
 class Sight {
  public:
   Sight(const Camera& camera, const Lattice& level, const Reach& reach,
@@ -104,37 +108,61 @@ class Sight {
               (0.5 * camera.height + reach.pixels) * pixel};
   }
 
+  // The bounds of all units; the first if none is in sight.
   Units bounds() {
-    Units all{};
-    for (std::size_t a = 0; a < 3; ++a) all[a] = {0, (level_.dims[a] - 1) / quantum_[a] + 1};
-    found_ = {{{all[0][1], 0}, {all[1][1], 0}, {all[2][1], 0}}};
-    add(all);
-    if (found_[0][1] == 0) return {{{0, 1}, {0, 1}, {0, 1}}};
-    return found_;
+    const Units every = all();
+    Units found{{{every[0][1], 0}, {every[1][1], 0}, {every[2][1], 0}}};
+    const auto is_within = [&](const Units& units) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        if (units[a][0] < found[a][0] || units[a][1] > found[a][1]) return false;
+      }
+      return true;
+    };
+    visit(every, is_within, [&](const Units& unit) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        found[a] = {std::min(found[a][0], unit[a][0]), std::max(found[a][1], unit[a][1])};
+      }
+    });
+    if (found[0][1] == 0) return {{{0, 1}, {0, 1}, {0, 1}}};
+    return found;
+  }
+
+  // The units themselves, or more than `most` of them.
+  std::vector<Units> units(std::size_t most) {
+    std::vector<Units> found;
+    visit(
+        all(), [&](const Units&) { return found.size() > most; },
+        [&](const Units& unit) { found.push_back(unit); });
+    if (found.empty()) found.push_back({{{0, 1}, {0, 1}, {0, 1}}});
+    return found;
   }
 
  private:
-  void add(const Units& units) {
-    bool within = true;
+  [[nodiscard]] Units all() const {
+    Units out{};
+    for (std::size_t a = 0; a < 3; ++a) out[a] = {0, (level_.dims[a] - 1) / quantum_[a] + 1};
+    return out;
+  }
+
+  // Calls add() with each unit in sight, but for those of boxes that are left out.
+  template <class LeftOut, class Add>
+  void visit(const Units& units, const LeftOut& is_left_out, const Add& add) {
+    if (is_left_out(units) || !may_be_seen(units)) return;
     std::size_t longest = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      within = within && units[a][0] >= found_[a][0] && units[a][1] <= found_[a][1];
       if (units[a][1] - units[a][0] > units[longest][1] - units[longest][0]) longest = a;
     }
-    if (within || !may_be_seen(units)) return;
     const auto [first, end] = units[longest];
     if (end - first == 1) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        found_[a] = {std::min(found_[a][0], units[a][0]), std::max(found_[a][1], units[a][1])};
-      }
+      add(units);
       return;
     }
     Units half = units;
     const int middle = first + (end - first) / 2;
     half[longest] = {first, middle};
-    add(half);
+    visit(half, is_left_out, add);
     half[longest] = {middle, end};
-    add(half);
+    visit(half, is_left_out, add);
   }
 
   // As the engine culls: unless every corner of the box of positions, widened by the reach of
@@ -172,8 +200,17 @@ class Sight {
   const Reach& reach_;
   const std::array<int, 3> quantum_;
   std::array<double, 2> edges_{};  // of the picture from its middle, at unit depth
-  Units found_{};
 };
+
+data::Box box_of_units(const Units& units, const std::array<int, 3>& quantum,
+                       const std::array<int, 3>& dims) {
+  data::Box box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.first[a] = units[a][0] * quantum[a];
+    box.count[a] = std::min(units[a][1] * quantum[a], dims[a]) - box.first[a];
+  }
+  return box;
+}
 
 int rounded_up(int value, int unit) { return (value - 1) / unit * unit + unit; }
 
@@ -186,23 +223,28 @@ int common_multiple(int quantum, int stride, int most) {
 std::array<int, 3> brick_of(const std::vector<ShownField>& shown, const data::DatasetInfo& info) {
   std::array<int, 3> brick{1, 1, 1};
   for (const ShownField& one : shown) {
+    if (one.all) continue;
     const data::FieldInfo& field = *info.find(one.field);
     for (std::size_t a = 0; a < 3; ++a) brick[a] = std::max(brick[a], field.box_chunk[a]);
   }
   return brick;
 }
 
-// Of the volumes of a box, and of those from which they are drawn; nullopt: a field has no such
+// Of the volumes of a part, and of those from which they are drawn; nullopt: a field has no such
 // level.
-std::optional<std::uint64_t> bytes_of(const std::vector<ShownField>& shown, const data::Box& box,
-                                      const data::Dataset& dataset) {
+std::optional<std::uint64_t> bytes_of(const std::vector<ShownField>& shown,
+                                      const data::HeldPart& part, const data::Dataset& dataset) {
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t bytes = 0;
   for (const ShownField& one : shown) {
     if (!counted.emplace(one.field, one.coarsening.reduction).second) continue;
-    const auto part = part_of_field(dataset, one, box);
-    if (!part) return std::nullopt;
-    bytes += part->bytes + (part->from ? part->from->bytes : 0);
+    const auto how = part_of_field(dataset, one, part);
+    if (!how) return std::nullopt;
+    bytes += how->bytes + (how->from ? how->from->bytes : 0);
+    if (how->gathered) {  // while a box is read
+      const auto box = how->gathered->part(0);
+      bytes += box.bytes + (box.from ? box.from->bytes : 0);
+    }
   }
   return bytes;
 }
@@ -227,17 +269,18 @@ data::Derivation read_of(const data::FieldInfo& field, const data::StoredPart& p
 bool may_use_part(const View& view) { return !view.light && view.surfaces.empty(); }
 
 std::array<int, 3> least_quantum(const View& view, const std::array<int, 3>& dims,
-                                 const std::array<int, 3>& halvings) {
+                                 const std::array<int, 3>& halvings, bool lines_apart) {
+  const bool lines = shows_lines(view) && !lines_apart;
   std::array<int, 3> quantum{};
   for (std::size_t a = 0; a < 3; ++a) {
     const int samples = data::halved(dims[a], halvings[a]);
     quantum[a] = std::min(brick_kernels, samples);
     if (halvings != full) {
-      if (!shows_lines(view)) continue;
+      if (!lines) continue;
       quantum[a] = common_multiple(quantum[a], halved_stride(view, halvings[a]), samples);
       continue;
     }
-    int strides = shows_lines(view) ? std::min(view.vector.stride.value_or(1), samples) : 1;
+    int strides = lines ? std::min(view.vector.stride.value_or(1), samples) : 1;
     for (const protocol::ScalarView& scalar : *view.scalars) {
       if (absorbs(scalar)) strides = common_multiple(strides, scalar.stride, samples);
     }
@@ -251,44 +294,121 @@ data::Box box_in_sight(const View& view, const Camera& camera, const Lattice& wh
                        const std::array<int, 3>& halvings, const std::array<int, 3>& quantum) {
   const Lattice level = coarsen_lattice(whole, halvings);
   const Reach reach = reach_of(view, camera, whole, halvings, level);
-  const Units units = Sight(camera, level, reach, quantum).bounds();
-  data::Box box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    box.first[a] = units[a][0] * quantum[a];
-    box.count[a] = std::min(units[a][1] * quantum[a], level.dims[a]) - box.first[a];
-  }
-  return box;
+  return box_of_units(Sight(camera, level, reach, quantum).bounds(), quantum, level.dims);
 }
 
-std::optional<data::Box> box_for(const View& view, const Camera& camera, const Lattice& whole,
-                                 const std::array<int, 3>& halvings,
-                                 const std::vector<ShownField>& shown,
-                                 const data::Dataset& dataset) {
-  std::vector<std::string> fields;
-  fields.reserve(shown.size());
-  for (const ShownField& field : shown) fields.push_back(field.field);
-  const auto has_room = [&](const data::Box& box) {
-    const auto bytes = static_cast<double>(bytes_of(shown, box, dataset).value());
-    return dataset.fits_beside_boxes(static_cast<std::uint64_t>(bytes / part_share_max), fields);
-  };
-  const std::array<int, 3> least = least_quantum(view, whole.dims, halvings);
-  std::array<int, 3> quantum = brick_of(shown, dataset.info());
-  for (std::size_t a = 0; a < 3; ++a) quantum[a] = rounded_up(quantum[a], least[a]);
-  for (;;) {
-    const data::Box box = box_in_sight(view, camera, whole, halvings, quantum);
-    if (!bytes_of(shown, box, dataset)) return std::nullopt;
-    if (has_room(box)) return box;
-    // Smaller units would hardly leave out more than one at each end.
-    data::Box inner = box;
-    for (std::size_t a = 0; a < 3; ++a) inner.count[a] = std::max(1, box.count[a] - 2 * quantum[a]);
-    if (quantum == least || !has_room(inner)) return std::nullopt;
-    for (std::size_t a = 0; a < 3; ++a) quantum[a] = rounded_up(quantum[a] / 2, least[a]);
-  }
+std::optional<data::BoxGrid> boxes_in_sight(const View& view, const Camera& camera,
+                                            const Lattice& whole,
+                                            const std::array<int, 3>& halvings,
+                                            const std::array<int, 3>& size, int most) {
+  const Lattice level = coarsen_lattice(whole, halvings);
+  const Reach reach = reach_of(view, camera, whole, halvings, level);
+  const auto units = Sight(camera, level, reach, size).units(static_cast<std::size_t>(most));
+  if (units.size() > static_cast<std::size_t>(most)) return std::nullopt;
+  std::vector<data::Box> boxes;
+  boxes.reserve(units.size());
+  for (const Units& unit : units) boxes.push_back(box_of_units(unit, size, level.dims));
+  data::BoxGrid grid = data::grid_of(boxes, size, level.dims);
+  if (grid.places.size() > places_max) return std::nullopt;
+  return grid;
 }
 
-std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, const ShownField& shown,
-                                              const data::Box& samples) {
-  const data::DatasetInfo& info = dataset.info();
+namespace {
+
+// Looks for what of a level holds what is in sight, within the room for a part.
+class PartSearch {
+ public:
+  PartSearch(const View& view, const Camera& camera, const Lattice& whole,
+             const std::array<int, 3>& halvings, const std::vector<ShownField>& shown,
+             const data::Dataset& dataset)
+      : view_(view),
+        camera_(camera),
+        whole_(whole),
+        halvings_(halvings),
+        shown_(shown),
+        dataset_(dataset),
+        least_(least_quantum(view, whole.dims, halvings, holds_all_lines(shown))) {
+    for (const ShownField& field : shown) fields_.push_back(field.field);
+  }
+
+  [[nodiscard]] std::optional<data::HeldPart> part() const {
+    std::array<int, 3> brick = brick_of(shown_, dataset_.info());
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int samples = data::halved(whole_.dims[a], halvings_[a]);
+      brick[a] = rounded_up(std::min(brick[a], samples), least_[a]);
+    }
+    const data::Box bounds = box_in_sight(view_, camera_, whole_, halvings_, brick);
+    if (!bytes_of(shown_, {bounds, nullptr}, dataset_)) return std::nullopt;
+    if (auto found = grid(brick, bounds)) return found;
+    if (auto found = box(brick, bounds)) return found;
+    for (std::array<int, 3> size = brick; size != least_;) {
+      size = halved(size);
+      if (auto found = grid(size, bounds)) return found;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] bool has_room(const data::HeldPart& part) const {
+    const auto bytes = static_cast<double>(bytes_of(shown_, part, dataset_).value());
+    return dataset_.fits_beside_boxes(static_cast<std::uint64_t>(bytes / part_share_max), fields_);
+  }
+
+  [[nodiscard]] std::array<int, 3> halved(std::array<int, 3> quantum) const {
+    for (std::size_t a = 0; a < 3; ++a) {
+      quantum[a] = rounded_up(std::max(1, quantum[a] / 2), least_[a]);
+    }
+    return quantum;
+  }
+
+  // Boxes of that size, unless they hold more than half of the bounds or are too many.
+  [[nodiscard]] std::optional<data::HeldPart> grid(const std::array<int, 3>& size,
+                                                   const data::Box& bounds) const {
+    auto found = boxes_in_sight(view_, camera_, whole_, halvings_, size, boxes_max);
+    if (!found || 2 * data::samples_of(*found) > bounds.samples()) return std::nullopt;
+    data::HeldPart part{found->bounds, std::make_shared<const data::BoxGrid>(std::move(*found))};
+    return has_room(part) ? std::optional(std::move(part)) : std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<data::HeldPart> box(std::array<int, 3> quantum,
+                                                  const data::Box& bounds) const {
+    data::HeldPart found{bounds, nullptr};
+    while (!has_room(found)) {
+      // Smaller units would hardly leave out more than one at each end.
+      data::HeldPart inner = found;
+      for (std::size_t a = 0; a < 3; ++a) {
+        inner.box.count[a] = std::max(1, found.box.count[a] - 2 * quantum[a]);
+      }
+      if (quantum == least_ || !has_room(inner)) return std::nullopt;
+      quantum = halved(quantum);
+      found.box = box_in_sight(view_, camera_, whole_, halvings_, quantum);
+    }
+    return found;
+  }
+
+  const View& view_;
+  const Camera& camera_;
+  const Lattice& whole_;
+  const std::array<int, 3>& halvings_;
+  const std::vector<ShownField>& shown_;
+  const data::Dataset& dataset_;
+  const std::array<int, 3> least_;
+  std::vector<std::string> fields_;
+};
+
+}  // namespace
+
+std::optional<data::HeldPart> part_for(const View& view, const Camera& camera, const Lattice& whole,
+                                       const std::array<int, 3>& halvings,
+                                       const std::vector<ShownField>& shown,
+                                       const data::Dataset& dataset) {
+  return PartSearch(view, camera, whole, halvings, shown, dataset).part();
+}
+
+namespace {
+
+std::optional<data::Derivation> box_of_field(const data::DatasetInfo& info, const ShownField& shown,
+                                             const data::Box& samples) {
   const data::Coarsening& how = shown.coarsening;
   const data::FieldInfo* const about = info.find(shown.field);
   if (about == nullptr) return std::nullopt;
@@ -321,6 +441,36 @@ std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, cons
   out.make = [of_box, dims = info.grid.dims()](const data::Volume& strided) {
     return data::draw(strided, of_box, dims);
   };
+  return out;
+}
+
+}  // namespace
+
+bool holds_all_lines(const std::vector<ShownField>& shown) {
+  return std::any_of(shown.begin(), shown.end(), [](const ShownField& one) { return one.all; });
+}
+
+std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, const ShownField& shown,
+                                              const data::HeldPart& part) {
+  if (shown.all) return dataset.stored_reduction(shown.field, shown.coarsening);
+  const auto info = dataset.shared_info();
+  if (!part.grid) return box_of_field(*info, shown, part.box);
+  const auto boxes = std::make_shared<const std::vector<data::Box>>(part.grid->boxes());
+  auto out = box_of_field(*info, shown, boxes->front());
+  if (!out) return std::nullopt;
+  data::GatheredBoxes gathered;
+  gathered.grid = data::strided_grid(*part.grid, shown.middles ? shown.coarsening.stride : 1);
+  gathered.part = [info, shown, boxes](std::size_t n) {
+    return box_of_field(*info, shown, (*boxes)[n]).value();
+  };
+  const data::Box first = gathered.grid.boxes().front();
+  out->variant.resize(out->variant.size() - data::key_of(first).size());
+  out->variant += data::key_of(gathered.grid);
+  out->bytes = out->bytes / first.samples() * data::samples_of(gathered.grid);
+  out->make = nullptr;
+  out->from = nullptr;
+  out->stored = std::nullopt;
+  out->gathered = std::make_shared<const data::GatheredBoxes>(std::move(gathered));
   return out;
 }
 

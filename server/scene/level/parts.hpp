@@ -1,6 +1,6 @@
-// Parts of a level: the box of its samples within the picture's pyramid, where the whole does not
-// fit into memory (docs/design/bricks.md). View + camera + description -> box -> what is read of a
-// field.
+// Parts of a level: the samples within the picture's pyramid, where the whole does not fit into
+// memory (docs/design/bricks.md). View + camera + description -> a box, or boxes of a grid -> what
+// is read of a field.
 #pragma once
 
 #include <array>
@@ -10,6 +10,7 @@
 
 #include "protocol/view.hpp"
 #include "server/data/model/box.hpp"
+#include "server/data/model/box_grid.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/scene/scene.hpp"
@@ -19,7 +20,7 @@ namespace windsplat::scene {
 // What of the data a picture is drawn from. It follows from view, description and memory limit.
 struct DrawnPart {
   std::array<int, 3> halvings{0, 0, 0};  // of the axes of the data
-  std::optional<data::Box> box;          // samples of that level; nullopt: all of them
+  std::optional<data::HeldPart> held;    // samples of that level; nullopt: all of them
   std::array<int, 3> wanted{0, 0, 0};    // halvings that would suffice for the picture
 };
 
@@ -30,6 +31,8 @@ struct ShownField {
   // Lines at full detail of which the middles of their kernels alone are read: the draw of groups
   // that are kernels, whose boxes are data::strided_box() of those of the samples.
   bool middles = false;
+  // Of these, that all are held where other fields have a part, since they take little.
+  bool all = false;
 };
 
 // What a field is drawn from.
@@ -51,21 +54,31 @@ data::Box box_in_sight(const protocol::View& completed, const Camera& camera, co
 // Boxes begin and end at multiples of these, or with the data: bricks of kernels of every stride,
 // and whole groups of the kernels that are drawn at a coarser level.
 // dims: of the data.
+// lines_apart: all lines are held, and not those of a part.
 std::array<int, 3> least_quantum(const protocol::View& completed, const std::array<int, 3>& dims,
-                                 const std::array<int, 3>& halvings);
+                                 const std::array<int, 3>& halvings, bool lines_apart);
 
-// The box of the level that holds what is in sight, rounded to bricks of the store, or to as little
-// as is needed to take at most 45 % of what a loader leaves of the memory limit, so that the box
-// before it fits too.
-// nullopt: it does not, or a field has no such level.
-std::optional<data::Box> box_for(const protocol::View& completed, const Camera& camera,
-                                 const Lattice& whole, const std::array<int, 3>& halvings,
-                                 const std::vector<ShownField>& shown,
-                                 const data::Dataset& dataset);
+// The boxes of `size` samples of which box_in_sight() is the bounds, if they are at most `most`:
+// those that the picture may show.
+std::optional<data::BoxGrid> boxes_in_sight(const protocol::View& completed, const Camera& camera,
+                                            const Lattice& whole,
+                                            const std::array<int, 3>& halvings,
+                                            const std::array<int, 3>& size, int most);
 
-// What is read of a field for a box of samples of the level that is drawn; nullopt: that is not
-// stored.
+// What of the level holds what is in sight: the bricks of the store in sight if they are at most
+// half of the box around them, or that box; otherwise the box rounded to as little as is needed, or
+// smaller boxes of a grid. It takes at most 45 % of what a loader leaves of the memory limit, so
+// that the part before it fits too. nullopt: it does not, or a field has no such level.
+std::optional<data::HeldPart> part_for(const protocol::View& completed, const Camera& camera,
+                                       const Lattice& whole, const std::array<int, 3>& halvings,
+                                       const std::vector<ShownField>& shown,
+                                       const data::Dataset& dataset);
+
+bool holds_all_lines(const std::vector<ShownField>& shown);
+
+// What is read of a field for a part of the samples of the level that is drawn; nullopt: that is
+// not stored.
 std::optional<data::Derivation> part_of_field(const data::Dataset& dataset, const ShownField& shown,
-                                              const data::Box& box);
+                                              const data::HeldPart& part);
 
 }  // namespace windsplat::scene

@@ -29,10 +29,10 @@ bool is_finer(const std::array<int, 3>& level, const std::array<int, 3>& than) {
 
 // nullopt: there is no such part.
 std::optional<data::Derivation> derivation_of(const ShownField& shown,
-                                              const std::optional<data::Box>& box,
+                                              const std::optional<data::HeldPart>& part,
                                               const data::Dataset& dataset) {
-  const auto& [field, how, middles] = shown;
-  if (box) return part_of_field(dataset, shown, *box);
+  const auto& [field, how, middles, all] = shown;
+  if (part) return part_of_field(dataset, shown, *part);
   auto stored = dataset.stored_reduction(field, how);
   return stored ? std::move(*stored) : dataset.reduction(field, how);
 }
@@ -55,38 +55,43 @@ class Shown {
     std::set<std::pair<std::string, std::string>> counted;
     std::uint64_t bytes = 0;
     for (const ShownField& one : at(part.halvings)) {
-      const auto how = derivation_of(one, part.box, dataset_);
+      const auto how = derivation_of(one, part.held, dataset_);
       if (!how || dataset_.has(one.field, step_, *how)) continue;
       if (!counted.emplace(one.field, how->variant).second) continue;
-      bytes += part.box ? how->bytes : dataset_.level_bytes(one.field, one.coarsening);
+      bytes += part.held ? how->bytes : dataset_.level_bytes(one.field, one.coarsening);
     }
     return bytes;
   }
 
   [[nodiscard]] bool is_resident(const std::vector<ShownField>& shown,
-                                 const std::optional<data::Box>& box) const {
+                                 const std::optional<data::HeldPart>& part) const {
     return std::all_of(shown.begin(), shown.end(), [&](const ShownField& one) {
-      const auto how = derivation_of(one, box, dataset_);
+      const auto how = derivation_of(one, part, dataset_);
       return how && dataset_.has(one.field, step_, *how);
     });
   }
 
-  // The smallest resident box of a level that holds what is in sight, and begins and ends as a box
-  // of the view does.
-  [[nodiscard]] std::optional<data::Box> resident_box(const std::array<int, 3>& halvings,
-                                                      const std::vector<ShownField>& shown) const {
+  // The smallest resident part of a level that holds what is in sight, and begins and ends as a
+  // part of the view does.
+  [[nodiscard]] std::optional<data::HeldPart> resident_part(
+      const std::array<int, 3>& halvings, const std::vector<ShownField>& shown) const {
     const data::Box any;
-    const ShownField& one = shown.front();
-    const auto how = part_of_field(dataset_, one, any);
+    const auto of_part = [](const ShownField& one) { return !one.all; };
+    const auto found = std::find_if(shown.begin(), shown.end(), of_part);
+    if (found == shown.end()) return std::nullopt;
+    const ShownField& one = *found;
+    const auto how = part_of_field(dataset_, one, {any, nullptr});
     if (!how) return std::nullopt;
-    auto boxes = dataset_.resident_boxes(one.field, step_, *how, any);
-    if (one.middles) expand(one.coarsening.stride, boxes);
-    if (boxes.empty()) return std::nullopt;
+    auto parts = dataset_.resident_parts(one.field, step_, *how, any);
+    if (one.middles) expand(one.coarsening.stride, parts);
+    if (parts.empty()) return std::nullopt;
     const std::array<int, 3> data_dims = completed_.lattice().dims;
-    const std::array<int, 3> quantum = least_quantum(view_, data_dims, halvings);
+    const std::array<int, 3> quantum =
+        least_quantum(view_, data_dims, halvings, holds_all_lines(shown));
     const data::Box sight =
         box_in_sight(view_, completed_.camera(), completed_.lattice(), halvings, quantum);
-    const auto fits = [&](const data::Box& box) {
+    const auto fits = [&](const data::HeldPart& part) {
+      const data::Box& box = part.box;
       for (std::size_t a = 0; a < 3; ++a) {
         const int end = box.first[a] + box.count[a];
         const bool holds = box.first[a] <= sight.first[a] && end >= sight.first[a] + sight.count[a];
@@ -95,24 +100,45 @@ class Shown {
             (end % quantum[a] == 0 || end == data::halved(data_dims[a], halvings[a]));
         if (!holds || !whole) return false;
       }
-      return is_resident(shown, box);
+      return (!part.grid || holds_sight(halvings, quantum, *part.grid)) && is_resident(shown, part);
     };
-    std::optional<data::Box> best;
-    for (const data::Box& box : boxes) {
-      if ((!best || box.samples() < best->samples()) && fits(box)) best = box;
+    std::optional<data::HeldPart> best;
+    for (const data::HeldPart& part : parts) {
+      if ((!best || part.samples() < best->samples()) && fits(part)) best = part;
     }
     return best;
   }
 
  private:
-  // Boxes of kernels to those of their samples.
-  void expand(int stride, std::vector<data::Box>& boxes) const {
-    for (data::Box& box : boxes) {
+  [[nodiscard]] bool holds_sight(const std::array<int, 3>& halvings,
+                                 const std::array<int, 3>& quantum,
+                                 const data::BoxGrid& held) const {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (held.size[a] % quantum[a] != 0) return false;
+    }
+    const auto needed = boxes_in_sight(view_, completed_.camera(), completed_.lattice(), halvings,
+                                       held.size, held.held);
+    return needed && data::is_held_by(*needed, held);
+  }
+
+  // Parts of kernels to those of their samples.
+  void expand(int stride, std::vector<data::HeldPart>& parts) const {
+    for (data::HeldPart& part : parts) {
+      const data::Box kernels = part.box;
       for (std::size_t a = 0; a < 3; ++a) {
-        const int end = (box.first[a] + box.count[a]) * stride;
-        box.first[a] *= stride;
-        box.count[a] = std::min(end, completed_.lattice().dims[a]) - box.first[a];
+        const int end = (kernels.first[a] + kernels.count[a]) * stride;
+        part.box.first[a] = kernels.first[a] * stride;
+        part.box.count[a] = std::min(end, completed_.lattice().dims[a]) - part.box.first[a];
       }
+      if (!part.grid) continue;
+      auto grid = std::make_shared<data::BoxGrid>(*part.grid);
+      grid->bounds = part.box;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int samples = grid->size[a] * stride;
+        const bool is_one = grid->count[a] == 1;
+        grid->size[a] = is_one ? std::min(samples, completed_.lattice().dims[a]) : samples;
+      }
+      part.grid = std::move(grid);
     }
   }
 
@@ -131,7 +157,7 @@ bool may_stand_in(const CompletedView& completed, const data::Dataset& dataset) 
 bool is_base(const std::vector<ShownField>& shown, const data::Dataset& dataset) {
   std::vector<std::string> fields;
   std::uint64_t bytes = 0;
-  for (const auto& [field, how, middles] : shown) {
+  for (const auto& [field, how, middles, all] : shown) {
     if (!dataset.stored_reduction(field, how)) return false;
     bytes += dataset.level_bytes(field, how) + dataset.bytes_beside_level(field, how);
     fields.push_back(field);
@@ -154,9 +180,9 @@ std::optional<Substitute> stand_in_for(const CompletedView& completed, const Dra
     const bool same = level == wanted.halvings;
     if (!same && !may_merge(completed.view())) break;
     const auto fields = shown.at(level);
-    const auto box = shown.resident_box(level, fields);
-    if (!box && !shown.is_resident(fields, std::nullopt)) continue;
-    return Substitute{{level, box, wanted.wanted}, same ? 0 : missing};
+    const auto part = shown.resident_part(level, fields);
+    if (!part && !shown.is_resident(fields, std::nullopt)) continue;
+    return Substitute{{level, part, wanted.wanted}, same ? 0 : missing};
   }
   return std::nullopt;
 }
@@ -165,9 +191,10 @@ std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset
   std::vector<Needed> out;
   if (!may_stand_in(completed, dataset)) return out;
   const DrawnPart wanted = part_of(completed, dataset);
-  const auto add = [&](const std::vector<ShownField>& fields, const std::optional<data::Box>& box) {
+  const auto add = [&](const std::vector<ShownField>& fields,
+                       const std::optional<data::HeldPart>& part) {
     for (const ShownField& one : fields) {
-      if (auto how = derivation_of(one, box, dataset)) out.push_back({one.field, std::move(*how)});
+      if (auto how = derivation_of(one, part, dataset)) out.push_back({one.field, std::move(*how)});
     }
   };
   const Shown shown(completed, dataset);
@@ -181,7 +208,7 @@ std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset
     base = std::move(next);
   }
   add(base, std::nullopt);
-  add(shown.at(wanted.halvings), wanted.box);
+  add(shown.at(wanted.halvings), wanted.held);
   return out;
 }
 

@@ -175,7 +175,7 @@ struct Arrow {
 
 std::optional<Arrow> arrow_of(const Scene& scene, const VectorLayer& layer, const Cell& cell) {
   Vec data;
-  const std::size_t number = scene.lattice.number_of(cell.sample, layer.field_stride);
+  const std::size_t number = scene::vector_number(layer, scene.lattice, cell.sample);
   for (int c = 0; c < layer.field->components; ++c) {
     const float value = layer.field->component(c)[number];
     if (std::isnan(value)) return {};

@@ -323,6 +323,53 @@ class Levels(unittest.TestCase):
         x, y, z = (found["position"]["index"][axis] for axis in "xyz")
         self.assertEqual(np.float32(found["value"]), self.large["cloud"][0][z, y, x])
 
+    def oblique(self, height, x=0.1):
+        """A view of the cloud along a diagonal of the large store."""
+        return {"dataset": "large_store", "vector": {"field": None},
+                "scalars": [{"field": "cloud", "color": {"range": [0, 2e-3]},
+                             "extinction": [[0, 1], [2e-3, 40]]}],
+                "image": {"width": 160, "height": 120},
+                "camera": {"projection": "orthographic", "eye": [x + 1.2, -1.6, 0.95],
+                           "target": [x, 0, 0.05], "height": height}}
+
+    def test_a_zoom_along_a_diagonal_ends_with_every_sample(self):
+        """The box around what is in sight does not fit: only bricks in sight are read."""
+        finest = [9, 9, 9]
+        for height in (1.2, 0.6, 0.3, 0.1, 0.03, 0.01, 0.003):
+            view = self.oblique(height)
+            found = self.picture(self.tight, view, "application/x-npy")
+            drawn = self.detail(found)["drawn"]
+            self.assertTrue(all(a <= b for a, b in zip(drawn["halvings"], finest)), height)
+            finest = drawn["halvings"]
+        self.assertEqual(finest, [0, 0, 0])
+        bounds, boxes = np.prod(drawn["count"]), drawn["boxes"]
+        self.assertGreater(4 * bounds, 0.45 * 68 * 2**20)
+        self.assertLess(boxes["count"] * np.prod(boxes["size"]), 0.5 * bounds)
+        wanted = self.picture(self.roomy, view, "application/x-npy")
+        self.assertNotIn("boxes", self.detail(wanted)["drawn"])
+        self.assertEqual(found.body, wanted.body)
+        picks = [daemon.post("/v1/picks?x=80&y=60", view)
+                 for daemon in (self.tight, self.roomy)]
+        self.assertEqual([one.status for one in picks], [200, 200], picks[0].body[:500])
+        self.assertEqual(picks[0].body, picks[1].body)
+
+    def test_of_a_view_that_moves_only_the_bricks_that_are_new_are_read(self):
+        read = 'bricks_total{from="store"}'
+        store = pathlib.Path(self.folder.name) / "large_store.zarr"
+        boxes, reads = [], []
+        for daemons in ("one", "each"):
+            with Daemon(PROGRAM, store, f"--memory-limit={LIMIT}M") as daemon:
+                for x in ((0.1, 0.12) if daemons == "one" else (0.12,)):
+                    before = daemon.metric(f"windsplat_{read}")
+                    drawn = self.detail(self.picture(daemon, self.oblique(0.003, x)))["drawn"]
+                    boxes.append(drawn["boxes"]["count"])
+                    reads.append(daemon.metric(f"windsplat_{read}") - before)
+        first, moved, alone = reads
+        self.assertEqual(boxes[1], boxes[2])
+        self.assertGreaterEqual(first, boxes[0])
+        self.assertLess(moved, alone)
+        self.assertGreater(moved, 0)
+
     def test_a_picture_of_a_part_does_not_depend_on_what_was_drawn_before(self):
         views = [{**view, "dataset": "large_store"} for view in self.parts_of_views()]
         first = [self.picture(self.tight, view).body for view in views]

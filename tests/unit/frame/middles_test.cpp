@@ -109,7 +109,7 @@ TEST(Middles, LinesOfABoxReadThoseInIt) {
   EXPECT_EQ(of.log->wholes, 0);
   ASSERT_EQ(of.log->parts.size(), 1U);
   EXPECT_EQ(of.log->parts[0].as, StoredAs::strided);
-  EXPECT_EQ(of.log->parts[0].box, data::strided_box(*scene.lattice.part, 2));
+  EXPECT_EQ(of.log->parts[0].box, data::strided_box(scene.lattice.held(), 2));
   EXPECT_LT(of.log->parts[0].box.samples(), scene.lattice.part->samples() / 6);
 }
 
@@ -171,8 +171,8 @@ TEST(Middles, FitWhereTheSamplesDoNot) {
     return scene::part_of(completed_of(view), dataset);
   };
   EXPECT_EQ(part_at(4).halvings, (std::array{0, 0, 0}));
-  EXPECT_FALSE(part_at(4).box);
-  EXPECT_TRUE(part_at(3).box) << "the whole wind does not fit";
+  EXPECT_FALSE(part_at(4).held);
+  EXPECT_TRUE(part_at(3).held) << "the whole wind does not fit";
   EXPECT_TRUE(scene::build_scene(completed_of(of_lines(4)), dataset));
 }
 
@@ -186,7 +186,7 @@ TEST(Middles, OfLinesAloneABoxIsDrawnWhereTheWholeDoesNotFit) {
   view.method.detail = protocol::Detail::automatic;
   const auto part = scene::part_of(completed_of(view), dataset);
   EXPECT_EQ(part.halvings, (std::array{0, 0, 0}));
-  EXPECT_TRUE(part.box);
+  EXPECT_TRUE(part.held);
   EXPECT_EQ(part.wanted, (std::array{0, 0, 0}));
 }
 
@@ -342,16 +342,17 @@ TEST(Middles, AnotherResidentPartStandsIn) {
   const auto how = scene::coarsening_of(of.lattice(), {0, 0, 0});
   const auto lines = scene::lines_at(of.view(), how, of.lattice(), dataset);
   ASSERT_TRUE(lines.middles);
-  const auto quantum = scene::least_quantum(of.view(), dims, {0, 0, 0});
+  const auto quantum = scene::least_quantum(of.view(), dims, {0, 0, 0}, false);
   const data::Box narrow =
       scene::box_in_sight(of.view(), of.camera(), of.lattice(), {0, 0, 0}, quantum);
-  const auto part = scene::part_of_field(dataset, lines, narrow).value();
+  const auto part = scene::part_of_field(dataset, lines, {narrow, nullptr}).value();
   ASSERT_TRUE(dataset.derived("wind", 0, part));
-  const scene::DrawnPart wanted{{0, 0, 0}, data::whole_box(dims), {0, 0, 0}};
+  const scene::DrawnPart wanted{
+      {0, 0, 0}, data::HeldPart{data::whole_box(dims), nullptr}, {0, 0, 0}};
   const auto found = scene::stand_in_for(of, wanted, dataset);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->part.halvings, (std::array{0, 0, 0}));
-  EXPECT_EQ(found->part.box, narrow);
+  EXPECT_EQ(found->part.held, (data::HeldPart{narrow, nullptr}));
   EXPECT_EQ(found->missing_bytes, 0U);
 }
 

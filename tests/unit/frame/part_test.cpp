@@ -85,10 +85,22 @@ void look_along_axis(protocol::View& view, std::size_t axis) {
   if (view.camera.height) *view.camera.height *= 0.3;
 }
 
+// At every sample near a line along a diagonal.
+void look_along_diagonal(protocol::View& view) {
+  view.method.detail = protocol::Detail::full;
+  const auto& at = *view.camera.target;
+  view.camera.eye = protocol::Vec3{at[0] + 1.2, at[1] - 1.6, at[2] + 0.9};
+  view.camera.fov_y *= 0.1;
+  if (view.camera.height) *view.camera.height *= 0.1;
+}
+
 struct Tally {
   int parts = 0;
   int middles = 0;        // pictures of boxes of lines drawn from the middles of kernels
   int whole_middles = 0;  // the same of the whole
+  int boxes = 0;          // pictures of parts that are several boxes
+  int boxed_middles = 0;  // the same of lines drawn from the middles of kernels
+  int all_middles = 0;    // pictures of parts with all of these
   int drawn = 0;          // pictures that show something
   std::map<int, int> by_level;
 };
@@ -101,7 +113,9 @@ void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName me
   for (int n = 0; n < views; ++n) {
     protocol::View view = random_view(random);
     view.method.name = method;
-    if (random.below(2) == 0) look_along_axis(view, static_cast<std::size_t>(random.below(2)));
+    const int way = random.below(4);
+    if (way < 2) look_along_axis(view, static_cast<std::size_t>(random.below(2)));
+    if (way == 2) look_along_diagonal(view);
     if (method == protocol::MethodName::reference) view.image = {12, 9};
     const auto plain = scene::complete(view, roomy);
     ASSERT_TRUE(plain) << plain.error().message;
@@ -113,12 +127,12 @@ void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName me
         uneven);
     const scene::DrawnPart chosen = scene::part_of(completed, tight);
     const bool full = chosen.halvings == std::array{0, 0, 0};
-    if (!chosen.box && !full) continue;
+    if (!chosen.held && !full) continue;
     const auto part = scene::build_scene(completed, tight);
-    if (!chosen.box && !part) continue;  // does not fit
+    if (!chosen.held && !part) continue;  // does not fit
     ASSERT_TRUE(part) << part.error().message;
     const bool middles = part->vector && part->vector->field_stride > 1;
-    if (!chosen.box && !middles) continue;
+    if (!chosen.held && !middles) continue;
     const Scene whole = of_whole_level(*part, completed, roomy);
     engine::WorkReport of_part, of_whole;
     const std::vector<float> found = picture_of(*part, &of_part);
@@ -132,22 +146,30 @@ void compare(bool uneven, std::uint32_t seed, int views, protocol::MethodName me
     const auto shows = [](float v) { return v > 0; };
     const bool any = std::any_of(found.begin(), found.end(), shows);
     tally.drawn += any ? 1 : 0;
-    if (any && middles) ++(chosen.box ? tally.middles : tally.whole_middles);
+    if (any && middles) ++(chosen.held ? tally.middles : tally.whole_middles);
+    if (any && chosen.held && chosen.held->grid) {
+      ++tally.boxes;
+      tally.boxed_middles += middles && !part->vector->holds_all ? 1 : 0;
+    }
+    if (any && part->vector && part->vector->holds_all) ++tally.all_middles;
     if (any) ++tally.by_level[part->level[0]];
   }
 }
 
 TEST(Part, PicturesOfBothMethodsAreThoseOfTheWholeLevel) {
   Tally tally;
-  compare(false, 1, 90, protocol::MethodName::kernel, tally);
-  compare(true, 2, 90, protocol::MethodName::kernel, tally);
-  compare(false, 3, 90, protocol::MethodName::slab, tally);
-  compare(true, 4, 90, protocol::MethodName::slab, tally);
+  compare(false, 1, 140, protocol::MethodName::kernel, tally);
+  compare(true, 2, 140, protocol::MethodName::kernel, tally);
+  compare(false, 3, 140, protocol::MethodName::slab, tally);
+  compare(true, 4, 140, protocol::MethodName::slab, tally);
   EXPECT_GT(tally.parts, 60);
   EXPECT_GT(tally.drawn, 80);
   EXPECT_GT(tally.middles, 10);
   EXPECT_GT(tally.whole_middles, 20);
-  for (int level = 0; level < levels; ++level) EXPECT_GT(tally.by_level[level], 10) << level;
+  EXPECT_GT(tally.boxes, 40);
+  EXPECT_GT(tally.boxed_middles, 1);
+  EXPECT_GT(tally.all_middles, 20);
+  for (int level = 0; level < levels; ++level) EXPECT_GT(tally.by_level[level], 6) << level;
 }
 
 TEST(Part, TheReferenceIsThatOfTheWhole) {
@@ -195,7 +217,7 @@ TEST(Part, BoxesBeginWithBricksOfEveryStride) {
     data::Dataset roomy = store(100 * samples_bytes);
     const auto completed = scene::complete(view, roomy).value();
     for (int h = 0; h < levels; ++h) {
-      const auto quantum = scene::least_quantum(completed.view(), dims, {h, h, h});
+      const auto quantum = scene::least_quantum(completed.view(), dims, {h, h, h}, false);
       const data::Box box = scene::box_in_sight(completed.view(), completed.camera(),
                                                 completed.lattice(), {h, h, h}, quantum);
       const bool strided = h == 0 && protocol::has_strided_lines(completed.view());
@@ -209,6 +231,43 @@ TEST(Part, BoxesBeginWithBricksOfEveryStride) {
   }
 }
 
+// A cloud of one layer.
+data::Dataset layer_of_cloud(std::uint64_t bytes) {
+  data::DatasetInfo info;
+  const std::array<int, 3> counts{96, 96, 1};
+  for (std::size_t a = 0; a < 3; ++a) {
+    info.grid.axes.at(a).name = "xyz"[a];
+    for (int n = 0; n < counts.at(a); ++n) info.grid.axes.at(a).coordinates.push_back(n);
+  }
+  info.fields.resize(1);
+  info.fields[0].name = "cloud";
+  info.fields[0].components = {"cloud"};
+  info.steps.resize(1);
+  auto cloud = std::make_shared<data::Volume>();
+  cloud->dims = counts;
+  cloud->values = std::vector<float>(cloud->samples(), 1.0F);
+  finish_volume(*cloud);
+  return {test::stored_fields(std::move(info), {std::move(cloud)}, 3), "store", bytes};
+}
+
+TEST(Part, OfOneLayerHasItAsItsOnlyBoxAcross) {
+  protocol::View view = of_one_voxel();
+  view.method.detail = protocol::Detail::full;
+  view.camera.eye = {0.1, 0.1, 2};
+  view.camera.target = {0.1, 0.1, 0};
+  view.camera.up = {0, 1, 0};
+  view.camera.height = 0.3;
+  // Less than bricks of 16 x 16 take, and enough for boxes of 8 x 8.
+  for (const std::uint64_t bytes : {7000, 8000, 10000, 12000}) {
+    data::Dataset tight = layer_of_cloud(bytes);
+    const auto part = scene::part_of(scene::complete(view, tight).value(), tight);
+    if (!part.held) continue;
+    EXPECT_EQ(part.held->box.count[2], 1) << bytes;
+    return;
+  }
+  FAIL() << "no part";
+}
+
 TEST(Part, StridesWithoutASmallCommonMultipleTakeWholeAxes) {
   protocol::View view = of_one_voxel();
   view.vector.field.name = "wind";
@@ -218,11 +277,11 @@ TEST(Part, StridesWithoutASmallCommonMultipleTakeWholeAxes) {
     view.scalars->push_back(view.scalars->front());
     view.scalars->back().stride = stride;
   }
-  const auto quantum = scene::least_quantum(view, dims, {0, 0, 0});
+  const auto quantum = scene::least_quantum(view, dims, {0, 0, 0}, false);
   EXPECT_EQ(quantum, dims);
   data::Dataset tight = store(samples_bytes / 2);
   const auto completed = scene::complete(view, tight).value();
-  EXPECT_FALSE(scene::part_of(completed, tight).box);
+  EXPECT_FALSE(scene::part_of(completed, tight).held);
 }
 
 TEST(Part, AnEmptyPictureIsNotExplainedByTheValuesOfAPart) {
@@ -257,7 +316,7 @@ TEST(Part, CostCountsThePart) {
     return cost_of(scene::outline(view, dataset).value(), dataset).kernels;
   };
   const auto outline = scene::outline(view, tight).value();
-  ASSERT_TRUE(scene::part_of(outline, tight).box);
+  ASSERT_TRUE(scene::part_of(outline, tight).held);
   EXPECT_LT(of(tight), 0.9 * of(roomy));
 }
 
@@ -265,11 +324,42 @@ TEST(Part, SamplesOfAPartHaveIndicesOfTheWhole) {
   data::Dataset tight = store(samples_bytes / 2);
   const auto part = scene::build_scene(of_one_voxel(), tight).value();
   const DrawnSamples samples(part);
-  const data::Box box = *part.lattice.part;
+  const data::Box box = part.lattice.held();
   EXPECT_EQ(samples.low(), box.first);
   EXPECT_EQ(samples.count(), static_cast<std::int64_t>(box.samples()));
   EXPECT_EQ(samples.number(box.first), 0U);
   EXPECT_FALSE(samples.contains({box.first[0], box.first[1] - 1, box.first[2]}));
+}
+
+TEST(Part, SamplesOfBoxesAreThoseThatAreHeld) {
+  protocol::View view = of_one_voxel();
+  look_along_diagonal(view);
+  data::Dataset tight = store(samples_bytes / 2);
+  const auto part = scene::build_scene(view, tight).value();
+  const auto& grid = part.lattice.part.value().grid;
+  ASSERT_TRUE(grid);
+  const DrawnSamples samples(part);
+  std::set<Index> found;
+  for (std::int64_t n = 0; n < samples.count(); ++n) {
+    if (const auto at = samples.at(n)) found.insert(*at);
+  }
+  std::size_t held = 0;
+  for (const data::Box& box : grid->boxes()) {
+    held += box.samples();
+    for (const int x : {box.first[0], box.first[0] + box.count[0] - 1}) {
+      EXPECT_TRUE(found.count({x, box.first[1], box.first[2] + box.count[2] - 1}));
+    }
+  }
+  EXPECT_EQ(found.size(), held);
+  EXPECT_EQ(samples.count(), static_cast<std::int64_t>(grid->held) * 16 * 16 * 16);
+  // What is left out is no neighbour.
+  ASSERT_GT(std::count(grid->places.begin(), grid->places.end(), 0), 0);
+  for (const Index& at : found) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto next = samples.neighbour(at, a, 1);
+      EXPECT_TRUE(!next || found.count(*next));
+    }
+  }
 }
 
 }  // namespace

@@ -45,13 +45,13 @@ void load_box(data::Dataset& dataset, const scene::CompletedView& completed, int
               const data::Box& box, const std::string& field = "cloud") {
   auto how = scene::coarsening_of(completed.lattice(), {halvings, halvings, halvings});
   if (field == "wind") how = scene::drawn(how, completed.view());
-  const auto part = scene::part_of_field(dataset, {field, how}, box);
+  const auto part = scene::part_of_field(dataset, {field, how}, {box, nullptr});
   ASSERT_TRUE(dataset.derived(field, 0, part.value()));
 }
 
 data::Box sight(const scene::CompletedView& completed, int halvings) {
   const std::array<int, 3> level{halvings, halvings, halvings};
-  const auto quantum = scene::least_quantum(completed.view(), dims, level);
+  const auto quantum = scene::least_quantum(completed.view(), dims, level, false);
   return scene::box_in_sight(completed.view(), completed.camera(), completed.lattice(), level,
                              quantum);
 }
@@ -60,14 +60,14 @@ TEST(StandIn, IsTheFinestResidentThatHoldsWhatIsInSight) {
   data::Dataset tight = store(samples_bytes / 2);
   const auto completed = scene::complete(of_one_voxel(), tight).value();
   const DrawnPart wanted = scene::part_of(completed, tight);
-  ASSERT_TRUE(wanted.box);
+  ASSERT_TRUE(wanted.held);
   EXPECT_FALSE(substitute(completed, tight));
   load_level(tight, "cloud", completed, levels - 1);
   auto found = substitute(completed, tight);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->part.halvings, coarsest);
   EXPECT_EQ(found->part.wanted, wanted.wanted);
-  EXPECT_EQ(found->missing_bytes, wanted.box->samples() * sizeof(float));
+  EXPECT_EQ(found->missing_bytes, wanted.held->samples() * sizeof(float));
   load_level(tight, "cloud", completed, 2);
   EXPECT_EQ(substitute(completed, tight)->part.halvings, (std::array{2, 2, 2}));
 
@@ -82,7 +82,7 @@ TEST(StandIn, IsTheFinestResidentThatHoldsWhatIsInSight) {
   load_box(tight, completed, 1, box);
   found = substitute(completed, tight);
   EXPECT_EQ(found->part.halvings, (std::array{1, 1, 1}));
-  EXPECT_EQ(found->part.box, box);
+  EXPECT_EQ(found->part.held->box, box);
   EXPECT_GT(found->missing_bytes, 0U);
 
   ASSERT_TRUE(scene::build_scene(completed, tight));
@@ -93,15 +93,53 @@ TEST(StandIn, AnotherPartOfTheLevelMissesNothing) {
   data::Dataset tight = store(samples_bytes / 2);
   const auto completed = scene::complete(of_one_voxel(), tight).value();
   const data::Box narrow = sight(completed, 0);
-  ASSERT_NE(narrow, scene::part_of(completed, tight).box);
+  ASSERT_NE(narrow, scene::part_of(completed, tight).held->box);
   load_box(tight, completed, 0, narrow);
   data::Dataset resident = tight.resident_only();
   const auto drawn = scene::build_scene(completed, resident, StandIn::allowed).value();
-  EXPECT_EQ(drawn.lattice.part, narrow);
+  EXPECT_EQ(drawn.lattice.held(), narrow);
   EXPECT_EQ(drawn.missing_bytes, 0U);
   const auto final = scene::build_scene(completed, tight).value();
-  EXPECT_NE(final.lattice.part, narrow);
+  EXPECT_NE(final.lattice.held(), narrow);
   EXPECT_EQ(test::render(drawn).image.rgba, test::render(final).image.rgba);
+}
+
+protocol::View along_diagonal(double x) {
+  protocol::View view = of_one_voxel();
+  view.camera.target = {x, 0, 0.05};
+  view.camera.eye = {x + 1.2, -1.6, 0.95};
+  view.method.detail = protocol::Detail::full;
+  return view;
+}
+
+TEST(StandIn, BoxesOfAGridThatHoldAllInSightStandIn) {
+  data::Dataset tight = store(samples_bytes / 2);
+  const auto first = scene::complete(along_diagonal(0.1), tight).value();
+  const auto drawn = scene::build_scene(first, tight).value();
+  ASSERT_TRUE(drawn.lattice.part && drawn.lattice.part->grid);
+  // A little nearer, so that fewer boxes are in sight.
+  protocol::View nearer = along_diagonal(0.1);
+  nearer.camera.height = 1e-4;
+  nearer.method.detail = protocol::Detail::automatic;
+  const auto second = scene::complete(nearer, tight).value();
+  DrawnPart wanted = scene::part_of(second, tight);
+  ASSERT_TRUE(wanted.held && wanted.held->grid);
+  // Not in memory: all samples of the bounds.
+  wanted.held->grid = nullptr;
+  auto found = scene::stand_in_for(second, wanted, tight);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->part.held, drawn.lattice.part);
+  EXPECT_EQ(found->missing_bytes, 0U);
+  protocol::View steeper = along_diagonal(0.1);
+  steeper.camera.eye = protocol::Vec3{1.1, -1.6, 0.95};
+  const auto beside = scene::complete(steeper, tight).value();
+  const auto needed = scene::part_of(beside, tight).held.value();
+  const data::Box& bounds = drawn.lattice.part->box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    ASSERT_GE(needed.box.first[a], bounds.first[a]);
+    ASSERT_LE(needed.box.first[a] + needed.box.count[a], bounds.first[a] + bounds.count[a]);
+  }
+  EXPECT_FALSE(substitute(beside, tight)) << "other boxes are in sight";
 }
 
 TEST(StandIn, IsOfAllFieldsAtTheStepOfTheView) {
@@ -139,7 +177,7 @@ TEST(StandIn, IsNotAPartThatBeginsWithinAKernel) {
   load_box(tight, strided, 0, box);
   EXPECT_FALSE(substitute(strided, tight));
   view.scalars->front().stride = 1;
-  EXPECT_EQ(substitute(scene::complete(view, tight).value(), tight)->part.box, box);
+  EXPECT_EQ(substitute(scene::complete(view, tight).value(), tight)->part.held->box, box);
 }
 
 TEST(StandIn, IsOfFullDetailWhereNoOtherMayBeDrawn) {

@@ -159,7 +159,9 @@ export function detailLine({ detail }: Pick<ChosenMessage, "detail">): string {
   if (detail === undefined) return "";
   const { wanted, drawn } = detail;
   if (drawn.count === undefined && drawn.halvings.every((n) => n === 0)) return "";
-  const part = drawn.count === undefined ? "" : ` · part of ${drawn.count.join(" x ")} samples`;
+  const { count, boxes } = drawn;
+  const held = boxes === undefined ? "" : `${boxes.count} boxes within `;
+  const part = count === undefined ? "" : ` · part of ${held}${count.join(" x ")} samples`;
   const finer =
     wanted.halvings.join() === drawn.halvings.join() ? "" : ` · wanted ${levelText(wanted)}`;
   const missing =
