@@ -344,7 +344,9 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.background = parse_color(view.image.background).value();
   DrawnPart part = part_of(completed, dataset);
   if (stand_in == StandIn::allowed) {
-    if (const auto other = stand_in_for(completed, part, dataset)) {
+    auto other = stand_in_for(completed, part, dataset);
+    if (!other) other = base_for(completed, part, dataset);
+    if (other) {
       part = other->part;
       scene.missing_bytes = other->missing_bytes;
     }

@@ -237,10 +237,9 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
     return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
       const auto completed = completion->of(effect.view, available);
       if (!completed) return completed.error();
-      const bool may_stand_in = effect.may_stand_in && loading == Loading::none;
-      auto picture =
-          prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding), available,
-                          loading, may_stand_in ? scene::StandIn::allowed : scene::StandIn::none);
+      auto picture = prepare_picture(
+          *completed, effect.setting, frame_encoding(effect.encoding), available, loading,
+          effect.may_stand_in ? scene::StandIn::allowed : scene::StandIn::none);
       if (!picture && picture.error().kind == ErrorKind::not_resident) {
         const unsigned before = running->events.fetch_or(Running::waits_for_data);
         if ((before & Running::was_cancelled) != 0) return frame_cancelled();

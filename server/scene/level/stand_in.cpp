@@ -187,6 +187,35 @@ std::optional<Substitute> stand_in_for(const CompletedView& completed, const Dra
   return std::nullopt;
 }
 
+namespace {
+
+// The level that always stands in for what is wanted.
+std::optional<std::array<int, 3>> base_level(const CompletedView& completed, const Shown& shown,
+                                             const DrawnPart& wanted,
+                                             const data::Dataset& dataset) {
+  const auto& levels = dataset.info().stored->levels;
+  std::optional<std::array<int, 3>> base;
+  for (std::size_t n = levels.size(); n > 0 && may_merge(completed.view()); --n) {
+    const std::array<int, 3>& level = levels[n - 1];
+    if (level == wanted.halvings || is_finer(level, wanted.halvings)) break;
+    if (!is_base(shown.at(level), dataset)) break;
+    base = level;
+  }
+  return base;
+}
+
+}  // namespace
+
+std::optional<Substitute> base_for(const CompletedView& completed, const DrawnPart& wanted,
+                                   const data::Dataset& dataset) {
+  if (!may_stand_in(completed, dataset)) return std::nullopt;
+  const Shown shown(completed, dataset);
+  const std::uint64_t missing = shown.missing_bytes(wanted);
+  const auto level = base_level(completed, shown, wanted, dataset);
+  if (missing == 0 || !level) return std::nullopt;
+  return Substitute{{*level, std::nullopt, wanted.wanted}, missing};
+}
+
 std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset& dataset) {
   std::vector<Needed> out;
   if (!may_stand_in(completed, dataset)) return out;
@@ -198,16 +227,9 @@ std::vector<Needed> loads_of(const CompletedView& completed, const data::Dataset
     }
   };
   const Shown shown(completed, dataset);
-  const auto& levels = dataset.info().stored->levels;
-  std::vector<ShownField> base;
-  for (std::size_t n = levels.size(); n > 0 && may_merge(completed.view()); --n) {
-    const std::array<int, 3>& level = levels[n - 1];
-    if (level == wanted.halvings || is_finer(level, wanted.halvings)) break;
-    auto next = shown.at(level);
-    if (!is_base(next, dataset)) break;
-    base = std::move(next);
+  if (const auto base = base_level(completed, shown, wanted, dataset)) {
+    add(shown.at(*base), std::nullopt);
   }
-  add(base, std::nullopt);
   add(shown.at(wanted.halvings), wanted.held);
   return out;
 }

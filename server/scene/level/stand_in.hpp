@@ -26,6 +26,11 @@ struct Substitute {
 std::optional<Substitute> stand_in_for(const CompletedView& completed, const DrawnPart& wanted,
                                        const data::Dataset& dataset);
 
+// The finest whole level that takes little of the memory limit, resident or not: what is drawn
+// first where nothing is resident. nullopt: what is wanted is, or there is no such level.
+std::optional<Substitute> base_for(const CompletedView& completed, const DrawnPart& wanted,
+                                   const data::Dataset& dataset);
+
 // What is loaded while a view moves, in this order: the finest whole level that takes little of the
 // memory limit, which always stands in, and what is drawn once it is resident. Empty: nothing
 // stands in for it.

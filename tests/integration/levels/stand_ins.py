@@ -84,6 +84,7 @@ class StandIns(unittest.TestCase):
         store = pathlib.Path(cls.folder.name) / "large_store.zarr"
         axes = [100.0 * np.arange(n) for n in LARGE]
         write_store(store, made(LARGE, 1, masked=False), axes, 1, CHAIN, 3)
+        cls.store = store
         cls.daemon = Daemon(PROGRAM, store, f"--memory-limit={LIMIT}M")
 
     @classmethod
@@ -148,6 +149,20 @@ class StandIns(unittest.TestCase):
         self.assertEqual(self.daemon.metric("windsplat_frames_stand_in_total"),
                          stood_in + session.stood_in)
         self.assertEqual(picture, self.picture({**VIEW, "camera": camera}))
+
+    def test_the_first_picture_is_one_of_a_level_that_takes_little(self):
+        with Daemon(PROGRAM, self.store, f"--memory-limit={LIMIT}M") as daemon:
+            session = Session(daemon)
+            self.addCleanup(session.close)
+            rev = session.patch(VIEW)
+            _, final, first, _ = session.frame_of(rev)
+            self.assertFalse(final)
+            self.assertEqual(first["detail"]["wanted"]["halvings"], [0, 0, 0])
+            self.assertGreaterEqual(first["detail"]["drawn"]["halvings"], [2, 2, 2])
+            self.assertGreater(first["detail"]["missingBytes"], 0)
+            _, _, last, picture = session.frame_of(rev, final=True)
+            self.assertEqual(last["detail"]["drawn"]["halvings"], [0, 0, 0])
+            self.assertEqual(picture, self.picture(VIEW))
 
     def test_what_is_missing_arrives_while_the_view_moves(self):
         session = Session(self.daemon)

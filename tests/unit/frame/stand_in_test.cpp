@@ -89,6 +89,22 @@ TEST(StandIn, IsTheFinestResidentThatHoldsWhatIsInSight) {
   EXPECT_FALSE(substitute(completed, tight)) << "nothing stands in for what is resident";
 }
 
+TEST(StandIn, WhereNothingIsResidentALevelThatTakesLittleIsLoadedFirst) {
+  data::Dataset tight = store(samples_bytes / 2);
+  const auto completed = scene::complete(of_one_voxel(), tight).value();
+  const DrawnPart wanted = scene::part_of(completed, tight);
+  const auto base = scene::base_for(completed, wanted, tight);
+  ASSERT_TRUE(base);
+  const auto first = scene::build_scene(completed, tight, StandIn::allowed).value();
+  EXPECT_EQ(first.level, base->part.halvings);
+  EXPECT_GT(first.level, wanted.halvings);
+  EXPECT_EQ(first.missing_bytes, wanted.held->samples() * sizeof(float));
+  EXPECT_LT(tight.resident_bytes(), first.missing_bytes);
+  const auto final = scene::build_scene(completed, tight).value();
+  EXPECT_EQ(final.level, wanted.halvings);
+  EXPECT_FALSE(scene::base_for(completed, wanted, tight)) << "what is wanted is resident";
+}
+
 TEST(StandIn, AnotherPartOfTheLevelMissesNothing) {
   data::Dataset tight = store(samples_bytes / 2);
   const auto completed = scene::complete(of_one_voxel(), tight).value();
