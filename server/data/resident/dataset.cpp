@@ -170,12 +170,17 @@ bool Dataset::fits_beside_loader(std::uint64_t bytes,
 }
 
 bool Dataset::fits_beside_boxes(std::uint64_t bytes, const std::vector<std::string>& fields) const {
+  return bytes <= room_beside_boxes(fields);
+}
+
+std::uint64_t Dataset::room_beside_boxes(const std::vector<std::string>& fields) const {
   std::uint64_t reading = 0;
   for (const std::string& field : fields) {
     const FieldInfo* const about = state_->info.find(field);
     if (about != nullptr) reading = std::max(reading, reading_box_bytes(*about));
   }
-  return bytes + state_->bytes_beside(reading) <= state_->budget->bytes_max();
+  const std::uint64_t beside = state_->bytes_beside(reading);
+  return state_->budget->bytes_max() - std::min(beside, state_->budget->bytes_max());
 }
 
 Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,

@@ -124,7 +124,9 @@ class Dataset {
   // Whether that much fits into the memory limit beside a loader that reads the fields.
   [[nodiscard]] bool fits_beside_loader(std::uint64_t bytes,
                                         const std::vector<std::string>& fields) const;
-  // Whether that much fits into the memory limit beside a loader that reads boxes of the fields.
+  // What the memory limit leaves beside a loader that reads boxes of the fields, in bytes.
+  [[nodiscard]] std::uint64_t room_beside_boxes(const std::vector<std::string>& fields) const;
+  // Whether that much fits into it.
   [[nodiscard]] bool fits_beside_boxes(std::uint64_t bytes,
                                        const std::vector<std::string>& fields) const;
 

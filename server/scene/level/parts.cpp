@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <glm/geometric.hpp>
 #include <memory>
 #include <numeric>
 #include <set>
@@ -15,6 +14,7 @@
 #include "server/data/model/stored.hpp"
 #include "server/data/resident/budget.hpp"
 #include "server/scene/detail.hpp"
+#include "server/scene/level/sight.hpp"
 #include "server/scene/lines/mark.hpp"
 #include "server/scene/lines/reach.hpp"
 
@@ -57,12 +57,6 @@ VectorLayer lines_of(const View& view, const Camera& camera, const Lattice& whol
   return layer;
 }
 
-// How far kernels reach beyond their positions.
-struct Reach {
-  std::array<double, 3> world{};
-  double pixels = 0;  // in addition
-};
-
 // Bounds that the engine's culling does not exceed (kernel_reach in engine/bins, Projector).
 Reach reach_of(const View& view, const Camera& camera, const Lattice& whole,
                const std::array<int, 3>& halvings, const Lattice& level) {
@@ -93,114 +87,6 @@ Reach reach_of(const View& view, const Camera& camera, const Lattice& whole,
   out.pixels += rounding * outer_radius(lines);
   return out;
 }
-
-// Boxes of units along each axis: the first, and the one after the last.
-using Units = std::array<std::array<int, 2>, 3>;
-
-// Finds the units of samples in sight, dividing boxes of them.
-class Sight {
- public:
-  Sight(const Camera& camera, const Lattice& level, const Reach& reach,
-        const std::array<int, 3>& quantum)
-      : camera_(camera), level_(level), reach_(reach), quantum_(quantum) {
-    const double pixel = 2 * camera.half_height / camera.height;
-    edges_ = {(0.5 * camera.width + reach.pixels) * pixel,
-              (0.5 * camera.height + reach.pixels) * pixel};
-  }
-
-  // The bounds of all units; the first if none is in sight.
-  Units bounds() {
-    const Units every = all();
-    Units found{{{every[0][1], 0}, {every[1][1], 0}, {every[2][1], 0}}};
-    const auto is_within = [&](const Units& units) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        if (units[a][0] < found[a][0] || units[a][1] > found[a][1]) return false;
-      }
-      return true;
-    };
-    visit(every, is_within, [&](const Units& unit) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        found[a] = {std::min(found[a][0], unit[a][0]), std::max(found[a][1], unit[a][1])};
-      }
-    });
-    if (found[0][1] == 0) return {{{0, 1}, {0, 1}, {0, 1}}};
-    return found;
-  }
-
-  // The units themselves, or more than `most` of them.
-  std::vector<Units> units(std::size_t most) {
-    std::vector<Units> found;
-    visit(
-        all(), [&](const Units&) { return found.size() > most; },
-        [&](const Units& unit) { found.push_back(unit); });
-    if (found.empty()) found.push_back({{{0, 1}, {0, 1}, {0, 1}}});
-    return found;
-  }
-
- private:
-  [[nodiscard]] Units all() const {
-    Units out{};
-    for (std::size_t a = 0; a < 3; ++a) out[a] = {0, (level_.dims[a] - 1) / quantum_[a] + 1};
-    return out;
-  }
-
-  // Calls add() with each unit in sight, but for those of boxes that are left out.
-  template <class LeftOut, class Add>
-  void visit(const Units& units, const LeftOut& is_left_out, const Add& add) {
-    if (is_left_out(units) || !may_be_seen(units)) return;
-    std::size_t longest = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (units[a][1] - units[a][0] > units[longest][1] - units[longest][0]) longest = a;
-    }
-    const auto [first, end] = units[longest];
-    if (end - first == 1) {
-      add(units);
-      return;
-    }
-    Units half = units;
-    const int middle = first + (end - first) / 2;
-    half[longest] = {first, middle};
-    visit(half, is_left_out, add);
-    half[longest] = {middle, end};
-    visit(half, is_left_out, add);
-  }
-
-  // As the engine culls: unless every corner of the box of positions, widened by the reach of
-  // kernels, is outside of the same plane.
-  [[nodiscard]] bool may_be_seen(const Units& units) const {
-    std::array<std::array<double, 2>, 3> ends{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto& positions = level_.positions[a];
-      const int first = units[a][0] * quantum_[a];
-      const int last = std::min(units[a][1] * quantum_[a], level_.dims[a]) - 1;
-      const double eye = camera_.eye[static_cast<glm::length_t>(a)];
-      ends[a] = {positions[static_cast<std::size_t>(first)] - reach_.world[a] - eye,
-                 positions[static_cast<std::size_t>(last)] + reach_.world[a] - eye};
-    }
-    unsigned outside = 31;  // a bit for each plane
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      const glm::dvec3 at{ends[0][corner & 1U], ends[1][corner >> 1U & 1U], ends[2][corner >> 2U]};
-      const double x = glm::dot(at, camera_.right);
-      const double y = glm::dot(at, camera_.up);
-      const double depth = glm::dot(at, camera_.forward);
-      const double z = camera_.perspective ? depth : 1;
-      unsigned here = 0;
-      here |= x < -edges_[0] * z ? 1U : 0U;
-      here |= x > edges_[0] * z ? 2U : 0U;
-      here |= y < -edges_[1] * z ? 4U : 0U;
-      here |= y > edges_[1] * z ? 8U : 0U;
-      here |= camera_.perspective && depth < camera_.near ? 16U : 0U;
-      outside &= here;
-    }
-    return outside == 0;
-  }
-
-  const Camera& camera_;
-  const Lattice& level_;
-  const Reach& reach_;
-  const std::array<int, 3> quantum_;
-  std::array<double, 2> edges_{};  // of the picture from its middle, at unit depth
-};
 
 data::Box box_of_units(const Units& units, const std::array<int, 3>& quantum,
                        const std::array<int, 3>& dims) {
@@ -303,11 +189,19 @@ std::optional<data::BoxGrid> boxes_in_sight(const View& view, const Camera& came
                                             const std::array<int, 3>& size, int most) {
   const Lattice level = coarsen_lattice(whole, halvings);
   const Reach reach = reach_of(view, camera, whole, halvings, level);
-  const auto units = Sight(camera, level, reach, size).units(static_cast<std::size_t>(most));
-  if (units.size() > static_cast<std::size_t>(most)) return std::nullopt;
+  const auto found = Sight(camera, level, reach, size).boxes(static_cast<std::size_t>(most));
+  if (!found) return std::nullopt;
   std::vector<data::Box> boxes;
-  boxes.reserve(units.size());
-  for (const Units& unit : units) boxes.push_back(box_of_units(unit, size, level.dims));
+  for (const Units& units : *found) {
+    for (int z = units[2][0]; z < units[2][1]; ++z) {
+      for (int y = units[1][0]; y < units[1][1]; ++y) {
+        for (int x = units[0][0]; x < units[0][1]; ++x) {
+          const Units one{{{x, x + 1}, {y, y + 1}, {z, z + 1}}};
+          boxes.push_back(box_of_units(one, size, level.dims));
+        }
+      }
+    }
+  }
   data::BoxGrid grid = data::grid_of(boxes, size, level.dims);
   if (grid.places.size() > places_max) return std::nullopt;
   return grid;
@@ -338,7 +232,7 @@ class PartSearch {
       brick[a] = rounded_up(std::min(brick[a], samples), least_[a]);
     }
     const data::Box bounds = box_in_sight(view_, camera_, whole_, halvings_, brick);
-    if (!bytes_of(shown_, {bounds, nullptr}, dataset_)) return std::nullopt;
+    if (!bytes_of(shown_, {bounds, nullptr}, dataset_) || exceeds_room(brick)) return std::nullopt;
     if (auto found = grid(brick, bounds)) return found;
     if (auto found = box(brick, bounds)) return found;
     for (std::array<int, 3> size = brick; size != least_;) {
@@ -349,9 +243,28 @@ class PartSearch {
   }
 
  private:
+  [[nodiscard]] double room() const {
+    return part_share_max * static_cast<double>(dataset_.room_beside_boxes(fields_));
+  }
+
   [[nodiscard]] bool has_room(const data::HeldPart& part) const {
-    const auto bytes = static_cast<double>(bytes_of(shown_, part, dataset_).value());
-    return dataset_.fits_beside_boxes(static_cast<std::uint64_t>(bytes / part_share_max), fields_);
+    return static_cast<double>(bytes_of(shown_, part, dataset_).value()) <= room();
+  }
+
+  // Whether what lies within the picture as a whole takes more, whatever the size of boxes.
+  [[nodiscard]] bool exceeds_room(const std::array<int, 3>& size) const {
+    data::Box one;
+    for (std::size_t a = 0; a < 3; ++a) one.count[a] = size[a];
+    double bytes = 0;
+    for (const ShownField& field : shown_) {
+      const auto how = part_of_field(dataset_, field, {one, nullptr});
+      if (!field.all) bytes += static_cast<double>(how->bytes);
+    }
+    const Lattice level = coarsen_lattice(whole_, halvings_);
+    const Reach reach = reach_of(view_, camera_, whole_, halvings_, level);
+    // Fields may be shown several times, and boxes at the end of the data are not full.
+    const double units = 8 * static_cast<double>(shown_.size()) * room() / bytes;
+    return Sight(camera_, level, reach, size).has_within(static_cast<std::size_t>(units));
   }
 
   [[nodiscard]] std::array<int, 3> halved(std::array<int, 3> quantum) const {
