@@ -326,12 +326,17 @@ TEST(Shapes, FrameInfoCountsStreamletsWhereTheyAreTraced) {
 TEST(Shapes, FrameInfoNamesTheLevelAndThePartOfDataWithStoredLevels) {
   FrameInfo info = frame_info();
   EXPECT_FALSE(Json::parse(encode_frame_info(info)).contains("detail"));
-  info.detail.emplace().drawn = {{1, 1, 0},
-                                 std::array{std::array{64, 0, 8}, std::array{128, 64, 16}}};
+  info.detail.emplace().drawn = {
+      {1, 1, 0}, std::array{std::array{64, 0, 8}, std::array{128, 64, 16}}, {}};
   const std::string json = encode_frame_info(info);
   expect_shape("frameInfo", json);
   EXPECT_EQ(Json::parse(json)["detail"], Json::parse(R"({"wanted":{"halvings":[0,0,0]},
                 "drawn":{"halvings":[1,1,0],"first":[64,0,8],"count":[128,64,16]}})"));
+  info.detail->drawn.boxes = {{32, 64, 8}, 3};
+  const std::string of_boxes = encode_frame_info(info);
+  expect_shape("frameInfo", of_boxes);
+  EXPECT_EQ(Json::parse(of_boxes)["detail"]["drawn"]["boxes"],
+            Json::parse(R"({"size":[32,64,8],"count":3})"));
   info.detail->missing_bytes = 12345;
   const std::string standing_in = encode_frame_info(info);
   expect_shape("frameInfo", standing_in);
