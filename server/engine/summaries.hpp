@@ -57,8 +57,9 @@ struct PassSummaries {
     return !places.empty() && place_of(layer, v, u) == 0;
   }
   [[nodiscard]] int place_of(int layer, int v, int u) const {
-    return places[static_cast<std::size_t>(layer / box[0] * box_step[0] + v / box[1] * box_step[1] +
-                                           u / box[2] * box_step[2])];
+    const int index =
+        layer / box[0] * box_step[0] + v / box[1] * box_step[1] + u / box[2] * box_step[2];
+    return places[static_cast<std::size_t>(index)];
   }
   [[nodiscard]] std::size_t region(int layer, int v, int u) const {
     return (static_cast<std::size_t>(layer / kernels::brick_side) * v_bricks + v) * u_bricks + u;

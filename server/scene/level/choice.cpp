@@ -180,7 +180,7 @@ class Choice {
       level = no_finer(coarser_level(lattice_, slice, level, coarser));
       if (level != full && fits(level)) return {level, std::nullopt, level};
     }
-    const DrawnPart all{full, std::nullopt, level};
+    DrawnPart all{full, std::nullopt, level};
     if (!may_use_stored(view_, lattice_, dataset_)) return all;
     if (all_detail_fits(shown(full), dataset_)) return all;
     if (!may_merge(view_)) return {full, held(full), full};
