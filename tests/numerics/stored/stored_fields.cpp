@@ -18,6 +18,7 @@ using data::Volume;
 
 std::vector<double> widths_of(const data::Axis& axis) {
   const auto& at = axis.coordinates;
+  if (at.size() == 1) return {1};
   std::vector<double> out;
   for (std::size_t n = 0; n < at.size(); ++n) {
     const double low = n == 0 ? at[0] - (at[1] - at[0]) / 2 : (at[n - 1] + at[n]) / 2;
