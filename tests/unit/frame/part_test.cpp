@@ -186,6 +186,7 @@ TEST(Part, AViewOfFewVoxelsHasTheirExactValues) {
   const auto part = scene::build_scene(completed, tight).value();
   EXPECT_EQ(part.level, (std::array{0, 0, 0}));
   ASSERT_TRUE(part.lattice.part);
+  EXPECT_FALSE(part.lattice.part->grid) << "all of the box is in sight";
   EXPECT_LT(share_of(part), 0.2);
   const auto picked = pick(part, 20, 15, CancelToken()).value();
   ASSERT_TRUE(picked);
